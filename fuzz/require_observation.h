@@ -22,6 +22,7 @@ inline void require_sound(const Observation& o) {
   require(o.camera_from_unrolled.translation.allFinite() && o.camera_from_unrolled.rotation.coeffs().allFinite() &&
               std::isfinite(o.psi_rad),
           "the pose is finite");
+  require(o.p_false.value_or(0) >= 0 && o.p_false.value_or(0) <= 1, "p_false is a probability");
   if (o.marker) {
     const Observation::MarkerPose& m = *o.marker;
     require(m.camera_from_marker.translation.allFinite() && m.camera_from_marker.rotation.coeffs().allFinite(),

@@ -21,6 +21,9 @@ inline std::array<Eigen::Vector2d, 4> zero_points() {
 /// What one frame tells of one instrument. Its numbers are meaningful only when `status` is Status::ok; then every one
 /// is finite. Sigmas are one standard deviation.
 struct Observation {
+  static constexpr double false_rad = 0.1;  ///< psi that is off by more is wrong
+  static constexpr double usual_max_p_false = 1e-3;
+
   Status status = Status::no_marker;
   std::string instrument;  ///< its name in the rig
 
@@ -50,6 +53,10 @@ struct Observation {
   /// on a line and move with the pose.
   EdgesCovariance edges_covariance_px2 = EdgesCovariance::Zero();
   Features features;  ///< their covariance: features_covariance()
+
+  /// Method::surface only: the probability that psi is off by more than false_rad, since the print is not the rig's or
+  /// as sigma has it.
+  std::optional<double> p_false;
 
   /// Where the fitted shaft lies, to start the next frame from and to draw. camera_from_unrolled, psi.
   Rigid3 camera_from_unrolled;

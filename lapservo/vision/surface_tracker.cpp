@@ -14,10 +14,11 @@
 
 namespace lapservo::internal {
 
-SurfaceTracker::SurfaceTracker(const Rig& rig, bool single, std::optional<double> frame_budget)
+SurfaceTracker::SurfaceTracker(const Rig& rig, bool single, std::optional<double> frame_budget, double max_p_false)
     : rig_(rig),
       single_(single),
       frame_budget_(frame_budget),
+      max_p_false_(max_p_false),
       classes_(rig.instruments),
       light_(rig.camera.response.table()),
       channels_(rig.camera),
@@ -46,7 +47,10 @@ void SurfaceTracker::forget() {
 }
 
 Scene SurfaceTracker::scene_of(const ImageView& image, std::size_t i) const {
-  return {image, rig_.camera, classes_, rig_.instruments[i].marker, classes_.of_bands(i), others_, &prints_[i]};
+  Scene scene{image, rig_.camera, classes_, rig_.instruments[i].marker, classes_.of_bands(i), others_};
+  scene.known_sides = prints_[i].known_sides();
+  scene.max_p_false = max_p_false_;
+  return scene;
 }
 
 // What this frame shows of the print.

@@ -24,8 +24,9 @@ namespace lapservo::internal {
 /// is fitted freely: the image features are right then, and q is given only as far as the mismatch lets it be known.
 class SurfaceTracker {
  public:
-  /// `single`: every frame on its own. `frame_budget`: TrackerOptions::frame_budget.
-  SurfaceTracker(const Rig& rig, bool single, std::optional<double> frame_budget = std::nullopt);
+  /// `single`: every frame on its own. `frame_budget`, `max_p_false`: as TrackerOptions has them.
+  SurfaceTracker(const Rig& rig, bool single, std::optional<double> frame_budget = std::nullopt,
+                 double max_p_false = Observation::usual_max_p_false);
 
   /// `image_bgr` is 8-bit BGR of the rig's size, `time_s` as Tracker::track has it. One observation per instrument.
   const std::vector<Observation>& track(const cv::Mat& image_bgr, std::optional<double> time_s = std::nullopt);
@@ -52,6 +53,7 @@ class SurfaceTracker {
   Rig rig_;
   bool single_;
   std::optional<double> frame_budget_;
+  double max_p_false_;
   ColourClasses classes_;
   std::array<float, 256> light_;
   ChannelGeometry channels_;

@@ -132,7 +132,10 @@ TEST(SurfaceTracker, FollowingTellsTheSameAsLookingAnew) {
 // A defocused picture can't tell that the camera sharpens, and the next one may start from its blur: they are less sure
 // then, and those that follow are corrected again.
 TEST(SurfaceTracker, RemembersThatTheCameraSharpens) {
-  const Rig rig = scenes::usual_rig();
+  Rig rig = scenes::usual_rig();
+  // Else what is remembered of the print makes psi surer, too.
+  MarkerSigmas& sigmas = rig.instruments[0].marker.sigmas;
+  sigmas.bands_upper_m = sigmas.bands_lower_m = std::array{1e-5, 1e-5, 1e-5};
   effects::CameraEffects sharpened;
   sharpened.sharpening = 0.9, sharpened.sharpening_px = 1.3;
   SurfaceTracker following(rig, false), anew(rig, true);
@@ -464,13 +467,20 @@ class TurningInstrument {
       seen_ = tracker_.track(renderer.render({placement_of(rig_.instruments[0], q_)}, random_.bits()), time_s_)[0];
       if (seen_.status != Status::ok) continue;
       ++found;
-      expect_right(seen_, q_);
+      const double error_rad = std::abs(wrap_pi(seen_.rcm->q.psi_rad - q_.psi_rad));
+      EXPECT_LT(error_rad, std::min(0.01, 4 * std::sqrt(seen_.rcm->covariance(3, 3))));
     }
     return found;
   }
-  ShaftModel bloody(double fraction) {
+  // With the boundary between the first two bands hidden all round.
+  ShaftModel bloody() const {
+    constexpr int drops = 90;
+    constexpr double drop_radius_m = 1.2e-3;
     ShaftModel shaft = shaft_of(rig_.instruments[0]);
-    shaft.blotches = blood_over(shaft.marker, fraction, random_);
+    for (int i = 0; i < drops; ++i) {
+      const double tau_rad = two_pi * i / drops;
+      shaft.blotches.push_back({tau_rad, boundaries_m(shaft.marker, tau_rad)[1], drop_radius_m});
+    }
     return shaft;
   }
   void is_away(double duration_s) { time_s_ += duration_s; }
@@ -491,25 +501,22 @@ class TurningInstrument {
 // the instrument may have been exchanged since.
 TEST(SurfaceTracker, APrintThatWasSeenIsTrustedUnderBlood) {
   constexpr int markers = 8, frames = 4;
-  constexpr double step_rad = 0.1, blood = 0.5;
+  constexpr double step_rad = 0.1;
   const Rig rig = scenes::usual_rig();
   int found = 0, found_after = 0, found_exchanged = 0;
   for (std::uint64_t seed = 1; seed <= markers; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
-    TurningInstrument unseen(rig, seed), seen(rig, seed);
-    found += unseen.found(unseen.bloody(blood), frames, step_rad);
-    const ShaftModel bloody = seen.bloody(blood);
-    EXPECT_EQ(seen.found(shaft_of(rig.instruments[0]), frames, step_rad), frames);
-    found_after += seen.found(bloody, frames, step_rad);
-    TurningInstrument exchanged(rig, seed);
-    const ShaftModel as_bloody = exchanged.bloody(blood);
-    EXPECT_EQ(exchanged.found(shaft_of(rig.instruments[0]), frames, step_rad), frames);
+    TurningInstrument unseen(rig, seed), seen(rig, seed), exchanged(rig, seed);
+    found += unseen.found(unseen.bloody(), frames, step_rad);
+    for (TurningInstrument* instrument : {&seen, &exchanged})
+      EXPECT_EQ(instrument->found(shaft_of(rig.instruments[0]), frames, step_rad), frames);
+    found_after += seen.found(seen.bloody(), frames, step_rad);
     exchanged.is_away(3);
-    found_exchanged += exchanged.found(as_bloody, frames, step_rad);
+    found_exchanged += exchanged.found(exchanged.bloody(), frames, step_rad);
   }
-  EXPECT_LT(found_exchanged, 0.7 * markers * frames);
   EXPECT_GE(found_after, 0.9 * markers * frames);
-  EXPECT_LT(found, 0.7 * markers * frames) << "the test's own power";
+  EXPECT_LT(found_exchanged, 0.1 * markers * frames);
+  EXPECT_LT(found, 0.1 * markers * frames) << "the test's own power";
 }
 
 TEST(SurfaceTracker, ADamagedFrameSaysNothingOfThePrint) {

@@ -31,6 +31,8 @@ void check_image(const cv::Mat& image, const Camera& camera) {
 TrackerOptions checked(TrackerOptions options) {
   if (options.frame_budget && !(*options.frame_budget > 0))
     throw InputError("tracker", "frame_budget", std::to_string(*options.frame_budget), "above 0, or none");
+  if (!(options.max_p_false > 0 && options.max_p_false <= 1))
+    throw InputError("tracker", "max_p_false", std::to_string(options.max_p_false), "above 0, at most 1");
   return options;
 }
 
@@ -63,7 +65,7 @@ struct Tracker::State {
         method(options.method),
         deinterlace(options.deinterlace || rig.camera.deinterlace),
         even_field(rig.camera.response),
-        surface(rig, options.single, options.frame_budget),
+        surface(rig, options.single, options.frame_budget, options.max_p_false),
         centerline(rig) {}
 
   void observe(const cv::Mat& image_bgr, std::optional<double> time_s) {

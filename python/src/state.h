@@ -67,7 +67,7 @@ inline auto members(Features& v) {
 }
 inline auto members(Observation& v) {
   return std::tie(v.status, v.instrument, v.rcm, v.marker, v.tau_rad, v.sigma_tau_rad, v.edges_ideal_px, v.edges_raw_px,
-                  v.edges_covariance_px2, v.features, v.camera_from_unrolled, v.psi_rad, v.refused);
+                  v.edges_covariance_px2, v.features, v.camera_from_unrolled, v.psi_rad, v.p_false, v.refused);
 }
 inline auto members(Frame& v) {
   return std::tie(v.bgr, v.index, v.time_s, v.file, v.flaw);

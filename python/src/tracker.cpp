@@ -165,6 +165,8 @@ Sigmas are one standard deviation. Of an observation whose status is not ok, eve
                              "azimuth of the marker on the centre line, [0, 2 pi)")
       .def_property_readonly("sigma_tau_rad",
                              when_ok([](const Observed& seen) { return seen.observation.sigma_tau_rad; }))
+      .def_property_readonly("p_false", when_ok([](const Observed& seen) { return seen.observation.p_false; }),
+                             "probability that psi and tau are off by more than 0.1 rad; None by method 'centerline'")
       .def_property_readonly("edges_px",
                              when_ok([](const Observed& seen) { return points_of(seen.observation.edges_raw_px); }),
                              "float[4, 2]: e0 to e3 on the centre line, raw pixels")
@@ -294,16 +296,18 @@ void bind_tracker(py::module_& m) {
 
 Holds what it learnt from the frame before. Threads may share it; frames are then tracked one after another.)")
       .def(py::init([](std::shared_ptr<Rig> rig, const std::string& method, bool single, bool deinterlace,
-                       std::optional<double> frame_budget) {
-             return std::make_unique<SafeTracker>(std::move(rig),
-                                                  TrackerOptions{method_of(method), single, deinterlace, frame_budget});
+                       std::optional<double> frame_budget, double max_p_false) {
+             return std::make_unique<SafeTracker>(
+                 std::move(rig), TrackerOptions{method_of(method), single, deinterlace, frame_budget, max_p_false});
            }),
            py::arg("rig"), py::kw_only(), py::arg("method") = "surface", py::arg("single") = false,
            py::arg("deinterlace") = false, py::arg("frame_budget") = TrackerOptions().frame_budget,
+           py::arg("max_p_false") = TrackerOptions().max_p_false,
            "method: 'surface', or the paper's 'centerline'; single: every frame on its own, searched whole; "
            "deinterlace: track the field of the even rows; frame_budget: what a frame may cost, in counted units of "
            "about half a microsecond (a longer search goes on in the next frame), or None: as much as it takes, which "
-           "images that don't follow one another need.")
+           "images that don't follow one another need; max_p_false: an instrument is uncertain where a "
+           "print that differs from the rig makes psi wrong with a higher probability.")
       .def("track", &SafeTracker::track_frame, py::arg("frame"),
            "The same of a Frame; one that is flawed is refused, with its flaw for a status.")
       .def("track", &SafeTracker::track, py::arg("image"), py::arg("stamp_s") = py::none(),

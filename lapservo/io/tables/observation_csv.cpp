@@ -50,7 +50,7 @@ const char* const observation_csv_header =
     "e0_u_px,e0_v_px,e1_u_px,e1_v_px,e2_u_px,e2_v_px,e3_u_px,e3_v_px,"
     "s_rad,r_px,l_px,d_px,cross_ratio,"
     "marker_x_m,marker_y_m,marker_z_m,marker_qx,marker_qy,marker_qz,marker_qw,"
-    "sigma_marker_xy_m,sigma_marker_z_m,sigma_axis_rad,sigma_roll_rad";
+    "sigma_marker_xy_m,sigma_marker_z_m,sigma_axis_rad,sigma_roll_rad,p_false";
 
 std::vector<ObservationNumber> observation_numbers(const Observation& observation) {
   Numbers numbers(observation);
@@ -72,6 +72,7 @@ std::vector<ObservationNumber> observation_numbers(const Observation& observatio
   numbers.add(f.d_px, 4);
   numbers.add(f.cross_ratio, 7);
   add_marker(numbers, observation.marker);
+  numbers.add_sigma(rcm ? observation.p_false : std::nullopt);
   return std::move(numbers).all();
 }
 

@@ -34,6 +34,7 @@ Observation random_observation(Random& random) {
                                   {random.uniform(-0.1, 0.1), random.uniform(-0.1, 0.1), random.uniform(0.05, 0.2)}};
   o.marker->sigma_xy_m = 1e-5, o.marker->sigma_z_m = 2e-4, o.marker->sigma_axis_rad = 3e-4;
   o.marker->sigma_roll_rad = 4e-4;
+  o.p_false = 5e-5;
   o.tau_rad = random.uniform(0, two_pi);
   o.sigma_tau_rad = std::pow(10.0, random.uniform(-6, -2));
   for (std::size_t k = 0; k < 4; ++k) {
@@ -64,7 +65,7 @@ TEST(ObservationCsv, HasTheColumnsOfTheConventions) {
             "e0_u_px,e0_v_px,e1_u_px,e1_v_px,e2_u_px,e2_v_px,e3_u_px,e3_v_px,"
             "s_rad,r_px,l_px,d_px,cross_ratio,"
             "marker_x_m,marker_y_m,marker_z_m,marker_qx,marker_qy,marker_qz,marker_qw,"
-            "sigma_marker_xy_m,sigma_marker_z_m,sigma_axis_rad,sigma_roll_rad");
+            "sigma_marker_xy_m,sigma_marker_z_m,sigma_axis_rad,sigma_roll_rad,p_false");
 }
 
 TEST(ObservationCsv, NumbersComeBackFarFinerThanTheyAreKnown) {
@@ -99,6 +100,7 @@ TEST(ObservationCsv, NumbersComeBackFarFinerThanTheyAreKnown) {
     expect("marker_qx", pose.rotation.x(), 1e-8), expect("marker_qw", pose.rotation.w(), 1e-8);
     expect("sigma_marker_xy_m", 1e-5, 1e-8), expect("sigma_marker_z_m", 2e-4, 1e-7);
     expect("sigma_axis_rad", 3e-4, 1e-7), expect("sigma_roll_rad", 4e-4, 1e-7);
+    expect("p_false", 5e-5, 1e-8);
   }
 }
 
@@ -115,7 +117,7 @@ TEST(ObservationCsv, WithoutARegistrationTheRcmsColumnsAreEmpty) {
   o.rcm.reset(), o.features.r_px.reset();
   EXPECT_EQ(empty_columns(table_of(o)),
             (std::vector<std::string>{"theta_rad", "phi_rad", "rho_m", "psi_rad", "sigma_theta_rad", "sigma_phi_rad",
-                                      "sigma_rho_m", "sigma_psi_rad", "r_px"}));
+                                      "sigma_rho_m", "sigma_psi_rad", "r_px", "p_false"}));
 }
 
 TEST(ObservationCsv, WithoutAPoseTheMarkersColumnsAreEmpty) {
@@ -134,7 +136,7 @@ TEST(ObservationCsv, WithoutAnObservationEveryMeasurementIsEmpty) {
     const CsvTable table = table_of(o);
     EXPECT_EQ(table.text(0, "status"), to_string(status));
     EXPECT_EQ(table.text(0, "instrument"), "PSM1");
-    EXPECT_EQ(empty_columns(table).size(), 34U) << to_string(status);
+    EXPECT_EQ(empty_columns(table).size(), 35U) << to_string(status);
   }
 }
 

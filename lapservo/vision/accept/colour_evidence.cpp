@@ -1,7 +1,6 @@
 #include "lapservo/vision/accept/colour_evidence.h"
 
 #include <algorithm>
-#include <array>
 
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/marker/azimuths.h"
@@ -51,11 +50,10 @@ double spilled_beyond(const Scene& scene, const ShaftPose& pose, const CylinderV
   return seen ? static_cast<double>(spilled) / seen : 0;
 }
 
-// On how many of so many lines along the marker it holds; `holds` is given what tells the colour class so many pixels
-// beyond the boundary.
-template <class Holds>
-int count_lines(const Scene& scene, const ShaftPose& pose, std::size_t boundary, int lines, const Holds& holds) {
-  constexpr double reach = 0.9;
+}  // namespace
+
+int lines_in_clear_view(const Scene& scene, const ShaftPose& pose, std::size_t boundary, int lines) {
+  constexpr double reach = 0.9, beside_px = 4;
   const auto view = view_cylinder(pose.camera_from_unrolled, scene.marker.radius_m());
   if (!view) return 0;
   int count = 0;
@@ -63,33 +61,14 @@ int count_lines(const Scene& scene, const ShaftPose& pose, std::size_t boundary,
     const double azimuth_rad = visible_azimuth_rad(*view, reach, i, lines);
     const double tau_rad = marker_azimuth_rad(scene.marker, azimuth_rad, pose.psi_rad);
     const double along_m = boundaries_m(scene.marker, tau_rad)[boundary];
-    const double scale_px_per_m = along_px_per_m(scene, pose, azimuth_rad, along_m);
-    count += holds([&](double beyond_px) {
-      const Eigen::Vector3d on_shaft =
-          surface_point(scene.marker.radius_m(), azimuth_rad, along_m + beyond_px / scale_px_per_m);
-      return scene.class_on_shaft(pose.camera_from_unrolled * on_shaft);
-    });
+    const double beside_m = beside_px / along_px_per_m(scene, pose, azimuth_rad, along_m);
+    const auto shows_marker = [&](double at_m) {
+      return scene.is_ours(
+          scene.class_on_shaft(pose.camera_from_unrolled * surface_point(scene.marker.radius_m(), azimuth_rad, at_m)));
+    };
+    count += (boundary == 0 || shows_marker(along_m - beside_m)) && (boundary == 3 || shows_marker(along_m + beside_m));
   }
   return count;
-}
-
-}  // namespace
-
-int lines_with_both_colours(const Scene& scene, const ShaftPose& pose, std::size_t boundary, int lines) {
-  constexpr std::array<double, 2> beside_px{2.5, 4};  // beyond what a lens blurs
-  return count_lines(scene, pose, boundary, lines, [&](const auto& colour_at) {
-    return std::all_of(beside_px.begin(), beside_px.end(), [&](double px) {
-      return colour_at(-px) == scene.bands[boundary - 1] && colour_at(px) == scene.bands[boundary];
-    });
-  });
-}
-
-int lines_in_clear_view(const Scene& scene, const ShaftPose& pose, std::size_t boundary, int lines) {
-  constexpr double beside_px = 4;
-  return count_lines(scene, pose, boundary, lines, [&](const auto& colour_at) {
-    return (boundary == 0 || scene.is_ours(colour_at(-beside_px))) &&
-           (boundary == 3 || scene.is_ours(colour_at(beside_px)));
-  });
 }
 
 double spilled_in_patches(const Scene& scene, const ShaftPose& pose) {

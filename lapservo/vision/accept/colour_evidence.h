@@ -9,11 +9,8 @@ namespace lapservo::internal {
 
 // What pixels' colours say of a fit that would be refused without.
 
-/// On how many of so many lines along the marker both of an inner boundary's colours show beside it. An edge of blood
-/// has one of them at most.
-int lines_with_both_colours(const Scene& scene, const ShaftPose& pose, std::size_t boundary, int lines);
-
-/// And on how many nothing hides a boundary: colours of the marker, whichever, show on both sides, of an end inside.
+/// On how many of so many lines along the marker nothing hides a boundary: colours of the marker, whichever, show on
+/// both sides, of an end inside.
 int lines_in_clear_view(const Scene& scene, const ShaftPose& pose, std::size_t boundary, int lines);
 
 /// Of the ring beyond an end, the fraction with that end's colour, of both ends the larger; what shows it in patches,

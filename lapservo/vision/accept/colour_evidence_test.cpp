@@ -26,19 +26,6 @@ ShaftPose moved_along(const Shot& shot, double along_m) {
   return shot.truth(true).changed_by(Eigen::Vector4d(0, 0, along_m, 0)).pose();
 }
 
-TEST(ColourEvidence, ShowsBothColoursBesideABoundaryOnly) {
-  constexpr int lines = 40;
-  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
-    SCOPED_TRACE("seed " + std::to_string(seed));
-    const Shot& shot = usual_shot(seed);
-    const Scene scene = shot.sight.scene();
-    for (const std::size_t boundary : {1U, 2U}) {
-      EXPECT_GT(lines_with_both_colours(scene, moved_along(shot, 0), boundary, lines), lines / 2);
-      EXPECT_LE(lines_with_both_colours(scene, moved_along(shot, 1.5e-3), boundary, lines), 1);
-    }
-  }
-}
-
 // The frame with a stripe of blood along a boundary.
 cv::Mat with_blood_along(const Shot& shot, std::size_t boundary) {
   constexpr int lines = 200, radius_px = 6;

@@ -10,7 +10,6 @@
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/marker/azimuths.h"
 #include "lapservo/vision/accept/colour_evidence.h"
-#include "lapservo/vision/memory/print_record.h"
 
 namespace lapservo::internal {
 namespace {
@@ -64,86 +63,22 @@ int fewest_lines(const FineFit& fit) {
   return std::max(limits.min_of_end, fit.lines / limits.end_one_in);
 }
 
-// Whether an inner boundary is located on so many lines, or so plainly, that it is the marker's and no edge of blood.
-bool is_the_markers(const Scene& scene, const FineFit& fit, std::size_t boundary) {
-  if (fit.used[boundary] >= fewest_lines(fit)) return true;
-  return fit.used[boundary] >= limits.confirmed_lines &&
-         lines_with_both_colours(scene, fit.unknowns.pose(), boundary, fit.lines) >= limits.confirmed_lines;
-}
-
-// Whether points are missed since the camera's processing scatters them, as clipped colours do, and not since blood
-// hides them.
-bool is_scattered(const FineFit& fit) {
-  const auto& moved_px = fit.bias_px;
-  return fit.processing == Processing::found &&
-         *std::max_element(moved_px.begin(), moved_px.end()) > limits.scattering_processing_px;
-}
-
-// Whether earlier frames showed that the print is the rig's from there.
-bool is_known(const Scene& scene, const FineFit& fit) {
-  if (!scene.print) return false;
-  const auto tau_rad = facing_tau_rad(scene.marker, fit.unknowns.pose());
-  return tau_rad && scene.print->is_the_rigs(*tau_rad);
-}
-
-// Whether a print that is off would show. Where one inner boundary is left, or few lines of the other that may as well
-// be an edge of blood, its error looks like a turn. One whose bands were measured is not off, and a tolerance of that
-// size is in sigma. Where another instrument hides a part, it is asked even if both inner boundaries show: one of 13000
-// rows, with blood, was 0.13 rad wrong.
-bool would_show_a_print_that_is_off(const Scene& scene, const FineFit& fit, bool hidden_by_another) {
-  if (scene.marker.bands_are_measured()) return true;
-  if (scene.marker.tolerance_m >= limits.tolerance_of_prints_m) return true;
-  const bool few = std::min(located_of_lines(fit, 1), located_of_lines(fit, 2)) <= limits.missed_fraction;
-  const bool both_show = (fit.located_fraction() > limits.hardly_hidden || is_scattered(fit)) && !few;
-  if (both_show && !hidden_by_another) return true;
-  if (is_known(scene, fit)) return true;
-  // What another instrument hides is known: no edge of it is taken for a boundary, as one of blood may be.
-  const bool may_be_bloods = few && !hidden_by_another;
-  return fit.inner_off_m < (may_be_bloods ? limits.max_inner_off_of_few_m : limits.max_inner_off_m) &&
-         is_the_markers(scene, fit, 1) && is_the_markers(scene, fit, 2);
-}
-
 // Another instrument's colours beside a marker that shows as it should are no reason to doubt it.
 bool shows_wholly_among_others(const Scene& scene, const ColourAgreement& agreement, const FineFit& fit) {
   return scene.among_others && agreement.matching > limits.matching_among_others &&
          fit.located_fraction() > limits.located_among_others;
 }
 
-// Motion and turns move boundaries as a print's errors would; defocus is alike along the shaft and across it.
-bool has_moved(const FineFit& fit) {
-  if (variance_of_uneven_turn(fit.turn, std::nullopt) > 0) return true;
-  const auto [narrower_px, wider_px] = std::minmax(fit.blur.boundaries_px(), fit.blur.sides_px);
-  const bool even =
-      wider_px < limits.even_blur * narrower_px && std::abs(fit.blur.correlation) < limits.even_correlation;
-  return fit.blur.widest_px() > limits.unblurred_px && !even;
-}
-
-// How far a print that is suspicious may let psi be off, one sigma. The smaller the marker, the less a picture tells;
-// and what compression does to boundaries scatters their points, too.
-double max_sigma_suspected_rad(const FineFit& fit) {
-  if (!is_well_seen(fit) || has_moved(fit) || fit.inlier_rms_sigmas > limits.scattered_rms_sigmas)
-    return limits.max_sigma_suspected_of_poor_rad;
-  const double scale = std::max(1.0, limits.usual_radius_px / fit.radius_px);
-  return std::min(scale * limits.max_sigma_suspected_rad, limits.max_sigma_suspected_of_poor_rad);
-}
-
-// Sigma of psi, and whom to blame when it is too large: the print or the picture.
-Status validate_sigma(const Scene& scene, const FineFit& fit, const ColourAgreement& agreement) {
-  const bool off = fit.print_off_probability > limits.certainly_off;
-  const double limit = squared(off ? limits.max_sigma_print_off_rad : limits.max_sigma_psi_rad);
-  const double by_tolerance = fit.psi_variance_by_tolerance;
-  const double variance = fit.psi_variance;
+// Sigma of psi, and the print.
+Status validate_psi(const Scene& scene, const FineFit& fit, const ColourAgreement& agreement) {
+  const double limit = squared(limits.max_sigma_psi_rad), by_tolerance = fit.psi_variance_by_tolerance;
   if (by_tolerance < limit && misses_a_boundary(scene, fit, agreement)) return Status::marker_mismatch;
-  const double slack = limits.tolerance_slack * by_tolerance;
-  const bool well_seen = is_well_seen(fit);
-  if (!(variance < limit + slack && tells_psi(fit)))
-    return well_seen && fit.psi_variance_by_print > variance / 2 ? Status::marker_mismatch : Status::uncertain;
-  const double suspected = variance - fit.psi_variance_by_print + fit.psi_variance_suspected;
-  // Without the RCM it is in sigma only: there a picture tells less of the print, and no psi.
-  if (!fit.unknowns.q() || !(fit.psi_variance_suspected > 0) ||
-      suspected < squared(max_sigma_suspected_rad(fit)) + slack)
-    return Status::ok;
-  return well_seen ? Status::marker_mismatch : Status::uncertain;
+  if (fit.off_probability > limits.certainly_off)
+    return is_well_seen(fit) ? Status::marker_mismatch : Status::uncertain;
+  if (!(fit.psi_variance_rad2() < limit + limits.tolerance_slack * by_tolerance)) return Status::uncertain;
+  // Without the RCM a frame shows less of the print.
+  if (fit.unknowns.q() && !has_right_psi(scene, fit)) return Status::uncertain;
+  return Status::ok;
 }
 
 }  // namespace
@@ -152,11 +87,13 @@ bool is_well_seen(const FineFit& fit) {
   return fit.located_fraction() > limits.well_seen_fraction;
 }
 
+bool has_right_psi(const Scene& scene, const FineFit& fit) {
+  return fit.p_false < scene.max_p_false + limits.tolerance_slack * fit.p_false_by_tolerance;
+}
+
 bool tells_psi(const FineFit& fit) {
-  const double told_times = fit.psi_variance_suspected > 0 ? print_limits.suspected_told : 1;
-  const double told = fit.covariance(fit.covariance.rows() - 1, fit.covariance.cols() - 1);
-  return told <
-         squared(told_times * limits.max_sigma_told_rad) + limits.tolerance_slack * fit.psi_variance_by_tolerance;
+  return fit.psi_variance_rad2() <
+         squared(limits.max_sigma_told_rad) + limits.tolerance_slack * fit.psi_variance_by_tolerance;
 }
 
 ColourAgreement colour_agreement(const Scene& scene, const ShaftPose& pose) {
@@ -269,9 +206,7 @@ Status validate(const Scene& scene, const FineFit& fit) {
     return Status::uncertain;
   // Few boundaries need the sides beside them.
   if ((blurred || fraction < limits.mostly_hidden) && fit.sides_used < limits.min_sides) return Status::uncertain;
-  const Status status = validate_sigma(scene, fit, agreement);
-  if (status != Status::ok || would_show_a_print_that_is_off(scene, fit, hidden_by_another)) return status;
-  return too_little;
+  return validate_psi(scene, fit, agreement);
 }
 
 }  // namespace lapservo::internal

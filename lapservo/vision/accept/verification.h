@@ -14,17 +14,10 @@ namespace lapservo::internal {
 /// half of the 71 fits refused there have matching <= 0.54, located fraction <= 0.50, rms >= 1.6 sigma, sigma >= 33
 /// mrad.
 struct ValidationLimits {
-  double max_sigma_psi_rad = 0.02;        ///< five sigma: a tenth of a radian, from which on psi counts as wrong
-  double max_sigma_print_off_rad = 0.01;  ///< where the print is certainly off: how far is known from four numbers
-                                          ///< at best, so ten sigma
-  double certainly_off = 0.999;           ///< probability
-  /// And of psi as it is told, with what a suspicious print and a turn within the exposure add.
+  double max_sigma_psi_rad = 0.02;  ///< five sigma: a tenth of a radian, from which on psi counts as wrong
+  /// And of psi as it is told, with what one side alone or a turn within the exposure add.
   double max_sigma_told_rad = 0.04;
-  /// And of psi where a third of all prints are off (suspected_fractions), if this one is suspicious: an ink that lies
-  /// 0.05 mm aside has 12.2 mrad in shafts of the usual radius. Of hidden, moved or strongly compressed markers a
-  /// picture tells less: exact prints in H.264 have up to 29 mrad, mostly with residuals of 1.25 to 1.6 sigma.
-  double max_sigma_suspected_rad = 0.012, usual_radius_px = 46, max_sigma_suspected_of_poor_rad = 0.03;
-  double scattered_rms_sigmas = 1.25, even_blur = 1.3, even_correlation = 0.5;  ///< the latter of defocus
+  double certainly_off = 0.9;  ///< probability from which on the print is to blame
   /// Times what the rig's tolerance_m adds to the variance: who sets it wants to live with it.
   double tolerance_slack = 1.5;
   double well_seen_fraction = 0.7;  ///< of the boundary points, to blame the print
@@ -58,24 +51,9 @@ struct ValidationLimits {
   /// of each inner boundary and wholly_located of the other end (4 of the 18 that were missed of --blood 0.4, seeds 71
   /// and 72: right by 5 mrad).
   double less_hidden = 0.4, well_located = 0.25, wholly_located = 0.9;
-  /// Fewer lines are enough of an inner boundary beside which both of its colours show, on so many lines.
-  int confirmed_lines = 3;
-  /// Located fraction above which that is not asked where both inner boundaries show on missed_fraction of their lines.
-  double hardly_hidden = 0.75;
-  /// A processing that moves a boundary by more scatters points beyond their sigmas: of clipped colours (moved by 0.4
-  /// to 0.8 px, JPEG by up to 0.3) 0.55 are located with nothing hidden.
-  double scattering_processing_px = 0.35;
   double max_spilled = 0.12;  ///< of the ring beyond an end, with that end's colour: the end is elsewhere
   /// And where both ends are located on so much of their lines (2 of the 18).
   double max_spilled_of_located = 0.2, half_located = 0.4;
-
-  /// How far each inner boundary may lie from where on the print the rig says, three sigma included, unless its bands
-  /// were measured. Prints made by hand are off by 0.05 to 0.3 mm; 0.1 mm is a turn of 0.05 to 0.1 rad.
-  double max_inner_off_m = 0.09e-3, tolerance_of_prints_m = 0.1e-3;
-  /// Where blood leaves an inner boundary less than missed_fraction of its lines, an edge of the blood may be taken for
-  /// it, if the true one shows nowhere (displaced_boundary.h): of 6000 inks aside one was wrong by 0.1 rad with 90 um,
-  /// none with 70.
-  double max_inner_off_of_few_m = 0.07e-3;
 
   /// Wrong fits agree with few boundaries or sides, and badly; blood leaves few, which agree well; compression leaves
   /// many, noisy. So the boundaries' rms may grow with the located fraction, where more than a quarter of the sides
@@ -108,6 +86,9 @@ ColourAgreement colour_agreement(const Scene& scene, const ShaftPose& pose);
 
 /// Enough of the boundary points are located to blame the print or the registration.
 bool is_well_seen(const FineFit& fit);
+
+/// Whether psi is hardly ever wrong, whatever the print is; what the rig's tolerance makes of it does not count.
+bool has_right_psi(const Scene& scene, const FineFit& fit);
 
 /// Whether sigma of psi, as it is told, is small enough to be of use.
 bool tells_psi(const FineFit& fit);

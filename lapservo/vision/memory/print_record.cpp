@@ -11,18 +11,15 @@ namespace {
 
 constexpr const PrintRecordLimits& limits = print_record_limits;
 
-// 0 to sides - 1.
-std::size_t side_of(double tau_rad, std::size_t sides) {
-  const auto side = static_cast<std::size_t>(wrap_two_pi(tau_rad) / two_pi * static_cast<double>(sides));
-  return std::min(side, sides - 1);
+std::ptrdiff_t count(const std::array<PrintRecord::View, print_sides>& views, PrintRecord::View view) {
+  return std::count(views.begin(), views.end(), view);
 }
 
 }  // namespace
 
 bool shows_the_rigs_print(const FineFit& fit) {
   const int fewest = *std::min_element(fit.used.begin(), fit.used.end());
-  return fewest > limits.wholly_located * fit.lines && fit.far_off_probability < limits.most_far_off &&
-         fit.inner_off_m < limits.most_inner_off_m;
+  return fewest > limits.wholly_located * fit.lines && fit.p_false < limits.most_p_false;
 }
 
 void PrintRecord::begin_frame(double time_s) {
@@ -32,26 +29,28 @@ void PrintRecord::begin_frame(double time_s) {
 
 void PrintRecord::add(double tau_rad, View view) {
   seen_s_ = now_s_;
-  View& known = views_[side_of(tau_rad, sides)];
+  View& known = views_[print_side(tau_rad)];
   if (!(view == View::possible && known == View::the_rigs)) known = view;
 }
 
-bool PrintRecord::is_the_rigs(double tau_rad) const {
-  if (std::count(views_.begin(), views_.end(), View::off) > 0) return false;
-  const auto reach = [](double rad) { return static_cast<std::size_t>(std::lround(rad / two_pi * sides)); };
-  const auto seen_within = [&](std::size_t steps) {
+PrintSides PrintRecord::known_sides() const {
+  PrintSides known;
+  if (count(views_, View::off) > 0 || count(views_, View::the_rigs) < 2) return known;
+  const auto reach = [](double rad) { return static_cast<std::size_t>(std::lround(rad / two_pi * print_sides)); };
+  const auto seen_within = [&](std::size_t side, std::size_t steps) {
     std::size_t seen = 0;
-    const std::size_t first = side_of(tau_rad, sides) + sides - steps;
-    for (std::size_t i = 0; i <= 2 * steps; ++i) seen += views_[(first + i) % sides] == View::the_rigs;
+    for (std::size_t i = 0; i <= 2 * steps; ++i)
+      seen += views_[(side + print_sides - steps + i) % print_sides] == View::the_rigs;
     return seen;
   };
-  return seen_within(reach(limits.near_rad)) >= 1 && seen_within(reach(limits.in_view_rad)) >= 2;
+  for (std::size_t side = 0; side < print_sides; ++side)
+    known[side] = seen_within(side, reach(limits.near_rad)) >= 1 && seen_within(side, reach(limits.in_view_rad)) >= 2;
+  return known;
 }
 
 bool PrintRecord::is_off() const {
-  const auto off = std::count(views_.begin(), views_.end(), View::off);
-  const auto unseen = std::count(views_.begin(), views_.end(), View::unseen);
-  const auto others = static_cast<std::ptrdiff_t>(sides) - unseen - off;
+  const auto off = count(views_, View::off);
+  const auto others = static_cast<std::ptrdiff_t>(print_sides) - count(views_, View::unseen) - off;
   return off >= limits.least_off_sides && off > limits.off_for_others * others;
 }
 

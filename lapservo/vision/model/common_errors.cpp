@@ -97,7 +97,6 @@ CommonErrors common_errors(const EdgeMeasurements& pass, const ResidualLines& li
   const double unmodelled = std::max(1.0, scatter);
   for (double& error_px : errors.px) error_px *= unmodelled;
   for (double* error_px : {&errors.whole_px, &errors.leaning_px, &errors.bowed_px}) *error_px *= unmodelled;
-  errors.inner_doubt_scale = doubt_scale(sigma_px, blur.widest_px(), moved_px);
   errors.doubt = doubt_of(sigma_px, blur, pass.radius_px, moved_px, processed ? usual.doubted_of_processing : 1);
   return errors;
 }

@@ -66,7 +66,6 @@ struct CommonErrors {
     return m.group < 4 ? boundary_noise_scale : std::max(1.0, boundary_noise_scale);
   }
   PrintDoubt doubt;
-  double inner_doubt_scale = 1;  ///< by how much larger still noise is taken for PrintFit::inner_off_m
 };
 
 /// What a boundary of this blur as a whole may be off beside a camera's processing, on a shaft of this radius.

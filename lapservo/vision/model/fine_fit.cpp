@@ -187,9 +187,12 @@ void Fitter::judge() {
   fit_.in_image = pass_.in_image;
   fit_.sides_in_image = pass_.sides_in_image;
   const ResidualLines lines = residual_lines(pass_.all);
-  const auto print = fit_print(pass_.all, lines, unknowns(), film_prior(), scene_.marker,
+  const auto tau_rad = facing_tau_rad(scene_.marker, fit_.unknowns.pose());
+  const bool is_known = tau_rad && scene_.known_sides[print_side(*tau_rad)];
+  const auto print = fit_print(pass_.all, lines, unknowns(), film_prior(), scene_.marker, is_known,
                                common_errors(pass_, lines, fit_.blur, processed_, fit_.bias_px, departure_px()));
   if (!print) return;
+  fit_.as_the_rig_says = fit_.unknowns.changed_by(print->step_as_the_rig_says.head(unknowns()));
   fit_.unknowns = fit_.unknowns.changed_by(print->step.head(unknowns()));
   count_inliers();
   tell(*print);
@@ -226,13 +229,8 @@ void Fitter::tell(const PrintFit& print) {
   const double doubt =
       1 + fine_fit_limits.doubt_of_hidden * std::max(0.0, fine_fit_limits.usual_fraction - fit_.located_fraction());
   fit_.covariance = doubt * doubt * print.covariance;
-  fit_.inner_off_m = print.inner_off_m;
-  fit_.print_off_probability = print.off_probability;
-  // What the print may add goes by how often prints are off, not by what this picture shows.
-  fit_.psi_variance_by_print = print.psi_variance_by_print;
-  fit_.far_off_probability = print.far_off_probability;
-  fit_.psi_variance_suspected = print.psi_variance_suspected;
-  fit_.psi_variance = doubt * doubt * (print.psi_variance - print.psi_variance_by_print) + print.psi_variance_by_print;
+  fit_.off_probability = print.off_probability;
+  fit_.p_false = print.p_false, fit_.p_false_by_tolerance = print.p_false_by_tolerance;
   fit_.psi_variance_by_tolerance = doubt * doubt * print.psi_variance_by_tolerance;
   fit_.converged = true;
 }

@@ -33,7 +33,8 @@ inline constexpr FineFitLimits fine_fit_limits;
 struct FineFit {
   bool converged = false;
   PoseUnknowns unknowns;
-  UnknownMatrix covariance;  ///< of the unknowns, one sigma squared
+  PoseUnknowns as_the_rig_says;  ///< the pose, were the print exactly so
+  UnknownMatrix covariance;      ///< of the unknowns, one sigma squared
   EdgeBlur blur;
   double radius_px = 0;           ///< the shaft's
   int lines = 0;                  ///< generatrices looked at
@@ -42,13 +43,8 @@ struct FineFit {
   int sides_in_image = 0;         ///< places at which the shaft's sides were looked for
   int sides_used = 0;             ///< of them, those at which the side was located and agrees with the fit
   double inlier_rms_sigmas = 0;   ///< of the boundaries' residuals, print errors taken out, by noise and tolerated_px
-  double print_off_probability = 0;             ///< that the print is off by more than the rig's tolerance
-  double psi_variance = 0;                      ///< by which picture and print are judged (print_fit.h)
+  double off_probability = 0, p_false = 1, p_false_by_tolerance = 0;  ///< as PrintFit has them
   double psi_variance_by_tolerance = 0;         ///< of the covariance, what the rig's tolerance of the print adds
-  double psi_variance_by_print = 0;             ///< and what the print adds beyond that
-  double far_off_probability = 1;               ///< where many prints are off (print_fit.h)
-  double psi_variance_suspected = 0;            ///< and what one that is suspicious adds (print_fit.h)
-  double inner_off_m = 3;                       ///< how far off an inner boundary of the print may lie (print_fit.h)
   Processing processing = Processing::unknown;  ///< as far as asked
   int processing_explained = 0;                 ///< how often ProcessingEvidence::explained
   int asked_for_departure = 0;                  ///< how often find_departure() was
@@ -62,6 +58,7 @@ struct FineFit {
   /// Mean square of these points' residuals [sigma^2], with the inliers' limit for each that was not located: of two
   /// fits to a frame the better one has less.
   double misfit() const;
+  double psi_variance_rad2() const { return covariance(covariance.rows() - 1, covariance.cols() - 1); }
 };
 
 /// Whether to ask what the camera did to the picture beyond its response (picture_processing.h), which costs a tenth of

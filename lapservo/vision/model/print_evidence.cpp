@@ -11,13 +11,6 @@ const PrintVector& inner_shift() {
   return c;
 }
 
-// (I + c c^T)^(1/2), where |c| is 2.
-const PrintMatrix& root_of_ink_aside() {
-  static const PrintMatrix root =
-      PrintMatrix::Identity() + (std::sqrt(5.0) - 1) / 4 * inner_shift() * inner_shift().transpose();
-  return root;
-}
-
 // Of a matrix in which boundaries stand in blocks of their own.
 PrintMatrix inverse_by_boundary(const PrintMatrix& information) {
   PrintMatrix inverse = PrintMatrix::Zero();
@@ -47,28 +40,28 @@ PrintInformation doubted(PrintInformation print, const PrintShapes& shapes_mm) {
 }
 
 PrintMatrix covariance_of(const PrintMatrix& information_by_boundary, const PrintPrior& prior) {
-  const double variance = std::max(prior.sigma_mm * prior.sigma_mm, 1e-18);
-  PrintMatrix covariance = inverse_by_boundary(information_by_boundary + PrintMatrix::Identity() / variance);
-  if (prior.ink_aside) {  // whose prior's inverse is (I - c c^T / 5) / variance
-    const PrintVector moved = covariance * inner_shift();
-    covariance += moved * moved.transpose() / (5 * variance - inner_shift().dot(moved));
-  }
+  const double ink = prior.ink_mm * prior.ink_mm, least = ink > 0 ? 1e-6 : 1e-18;
+  const double bands = std::max(prior.bands_mm * prior.bands_mm, least);
+  PrintMatrix covariance = inverse_by_boundary(information_by_boundary + PrintMatrix::Identity() / bands);
+  if (!(ink > 0)) return covariance;
+  // The prior's inverse is (I - c c^T / (bands / ink + 4)) / bands.
+  const PrintVector moved = covariance * inner_shift();
+  covariance += moved * moved.transpose() / (bands * (bands / ink + 4) - inner_shift().dot(moved));
   return covariance;
 }
 
-PrintEvidence::PrintEvidence(const PrintInformation& print) : alone_(print) {
-  const PrintMatrix& root = root_of_ink_aside();
-  ink_aside_.information = root.lazyProduct(print.information.lazyProduct(root).eval());
-  ink_aside_.gradient = root.lazyProduct(print.gradient);
-}
+PrintEvidence::PrintEvidence(const PrintInformation& print)
+    : print_(print), by_ink_(print.information * inner_shift()), ink_(inner_shift().dot(by_ink_)) {}
 
-// (variance g^T (I + variance A)^-1 g - log |I + variance A|) / 2, by Gaussian elimination. The pivots are at least 1
-// but for rounding.
+// (g^T R (I + R A R)^-1 R g - log |I + R A R|) / 2, R the root of the prior's covariance: bands I + more c c^T. By
+// Gaussian elimination. The pivots are at least 1 but for rounding.
 double PrintEvidence::gain(const PrintPrior& prior) const {
-  const PrintInformation& print = prior.ink_aside ? ink_aside_ : alone_;
-  const double variance = prior.sigma_mm * prior.sigma_mm;
-  PrintMatrix left = PrintMatrix::Identity() + variance * print.information;
-  PrintVector gradient = print.gradient;
+  const double bands = prior.bands_mm, more = (std::hypot(bands, 2 * prior.ink_mm) - bands) / 4;
+  const PrintVector& c = inner_shift();
+  const PrintVector beside = bands * more * by_ink_ + 0.5 * more * more * ink_ * c;
+  PrintMatrix left = PrintMatrix::Identity() + bands * bands * print_.information;
+  left += beside * c.transpose() + c * beside.transpose();
+  PrintVector gradient = bands * print_.gradient + more * c.dot(print_.gradient) * c;
   double squares = 0, determinant = 1;
   for (int i = 0; i < print_errors; ++i) {
     const double pivot = std::max(1.0, left(i, i));
@@ -80,7 +73,7 @@ double PrintEvidence::gain(const PrintPrior& prior) const {
       gradient[j] -= factor * gradient[i];
     }
   }
-  return 0.5 * (variance * squares - std::log(determinant));
+  return 0.5 * (squares - std::log(determinant));
 }
 
 }  // namespace lapservo::internal

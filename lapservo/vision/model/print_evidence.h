@@ -15,15 +15,15 @@ struct PrintInformation {
 /// stands for grows by them (the Woodbury identity, a shape at a time).
 PrintInformation doubted(PrintInformation print, const PrintShapes& shapes_mm);
 
-/// What is assumed of the print's errors [mm]: each by itself, and where an ink lies aside both inner boundaries alike
-/// as well, which looks most like a turn: the covariance sigma^2 (I + c c^T), c the inner boundaries' shift.
+/// How large the print's errors are (one sigma) [mm]: each by itself, and both inner boundaries' alike, since the
+/// middle ink lies aside, which looks most like a turn. Their covariance is bands^2 I + ink^2 c c^T, c the inner
+/// boundaries' shift.
 struct PrintPrior {
-  double sigma_mm = 0;
-  bool ink_aside = false;
+  double bands_mm = 0, ink_mm = 0;
 };
 
 /// The covariance of the print's errors that a prior and the information, in which no boundary has to do with another,
-/// leave [mm^2].
+/// leave [mm^2]. Bands are taken to be off by a nanometre at least, by a micrometre where the ink lies aside.
 PrintMatrix covariance_of(const PrintMatrix& information_by_boundary, const PrintPrior& prior);
 
 /// How likely residuals make prints of any size of errors.
@@ -35,7 +35,9 @@ class PrintEvidence {
   double gain(const PrintPrior& prior) const;
 
  private:
-  PrintInformation alone_, ink_aside_;  // of errors whose prior is the same in all directions
+  PrintInformation print_;
+  PrintVector by_ink_;  // information * c
+  double ink_ = 0;      // c^T information c
 };
 
 }  // namespace lapservo::internal

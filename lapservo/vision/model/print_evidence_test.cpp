@@ -29,8 +29,8 @@ PrintInformation random_information(Random& random, int measurements) {
 
 PrintMatrix covariance_of_prior(const PrintPrior& prior) {
   PrintVector inner = PrintVector::Zero();
-  if (prior.ink_aside) inner.segment<4>(1).setOnes();
-  return prior.sigma_mm * prior.sigma_mm * (PrintMatrix::Identity() + inner * inner.transpose());
+  inner.segment<4>(1).setConstant(prior.ink_mm);
+  return prior.bands_mm * prior.bands_mm * PrintMatrix::Identity() + inner * inner.transpose();
 }
 
 TEST(PrintEvidence, OfDoubtedShapesIsThatOfALargerCovariance) {
@@ -52,10 +52,10 @@ TEST(PrintEvidence, OfDoubtedShapesIsThatOfALargerCovariance) {
 
 TEST(PrintEvidence, IsThatOfTheMarginalLikelihood) {
   Random random(2);
-  for (const bool ink_aside : {false, true})
-    for (const double sigma_mm : {0.0, 0.01, 0.16, 0.64}) {
+  for (const double ink_mm : {0.0, 0.04, 0.64})
+    for (const double bands_mm : {0.0, 0.01, 0.16, 0.64}) {
       const PrintInformation print = random_information(random, 12);
-      const PrintPrior prior{sigma_mm, ink_aside};
+      const PrintPrior prior{bands_mm, ink_mm};
       // What is measured of the errors is normal: by the noise alone, or with a print of the prior beneath it.
       const PrintMatrix noise = print.information.inverse(), both = noise + covariance_of_prior(prior);
       const PrintVector measured = noise * print.gradient;
@@ -69,21 +69,21 @@ TEST(PrintEvidence, IsThatOfTheMarginalLikelihood) {
 
 TEST(PrintEvidence, OfWhatTellsNothingIsNone) {
   const PrintEvidence evidence({});
-  for (const bool ink_aside : {false, true}) EXPECT_EQ(evidence.gain({0.3, ink_aside}), 0);
+  for (const double ink_mm : {0.0, 0.3}) EXPECT_EQ(evidence.gain({0.3, ink_mm}), 0);
 }
 
 TEST(PrintEvidence, CanBeHadWhereSomeErrorsDoNotShow) {
   Random random(3);
   for (int measurements = 1; measurements < print_errors; ++measurements) {
     const PrintEvidence evidence(random_information(random, measurements));
-    for (const bool ink_aside : {false, true}) EXPECT_TRUE(std::isfinite(evidence.gain({0.64, ink_aside})));
+    for (const double ink_mm : {0.0, 0.64}) EXPECT_TRUE(std::isfinite(evidence.gain({0.64, ink_mm})));
   }
 }
 
 TEST(PrintEvidence, AndThePriorLeaveTheirCommonCovariance) {
   Random random(4);
-  for (const bool ink_aside : {false, true})
-    for (const double sigma_mm : {0.02, 0.3}) {
+  for (const double ink_mm : {0.0, 0.04, 0.5})
+    for (const double bands_mm : {0.02, 0.3}) {
       PrintMatrix information = PrintMatrix::Zero();
       for (const auto& [upper, lower] : errors_of_boundary)
         for (int i = 0; i < 3; ++i) {
@@ -91,7 +91,7 @@ TEST(PrintEvidence, AndThePriorLeaveTheirCommonCovariance) {
           row[upper] = 30 * random.normal(), row[lower] = 30 * random.normal();
           information += row * row.transpose();
         }
-      const PrintPrior prior{sigma_mm, ink_aside};
+      const PrintPrior prior{bands_mm, ink_mm};
       const PrintMatrix expected = (information + covariance_of_prior(prior).inverse()).inverse();
       EXPECT_TRUE(covariance_of(information, prior).isApprox(expected, 1e-9));
     }

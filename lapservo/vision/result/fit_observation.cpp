@@ -1,5 +1,6 @@
 #include "lapservo/vision/result/fit_observation.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 
@@ -85,6 +86,7 @@ Observation observation_of(const Scene& scene, const FineFit& fit, const std::op
       features_of(line->ideal_px, camera_from_rcm ? projected_rcm_px(scene.camera, *camera_from_rcm) : std::nullopt);
   observation.camera_from_unrolled = pose.camera_from_unrolled;
   observation.psi_rad = pose.psi_rad;
+  observation.p_false = std::max(fit.p_false, p_false_of(0, fit.psi_variance_rad2()));
   observation.marker = marker_pose_of(scene.marker, fit.unknowns, fit.covariance);
   if (fit.unknowns.q()) {
     observation.rcm = Observation::Rcm{*fit.unknowns.q(), fit.covariance};

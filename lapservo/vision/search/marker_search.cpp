@@ -27,19 +27,14 @@ Found refusal(Status status, const PoseUnknowns& unknowns) {
 }
 
 // A print that is off would contradict any registration.
-bool contradicts_registration(const FineFit& free) {
-  constexpr double likelier_than_not = 0.5;
-  return is_well_seen(free) && free.print_off_probability < likelier_than_not && free.psi_variance_suspected == 0;
+bool contradicts_registration(const Scene& scene, const FineFit& free) {
+  return is_well_seen(free) && has_right_psi(scene, free);
 }
 
 // What the model leaves out of one side, the other one doesn't balance: error / sigma was 1.7 on 80 renderings.
 Found with_doubt_of_one_side(const Scene& scene, FineFit fit) {
   constexpr double doubt = 1.5;
   const Status status = validate(scene, fit);
-  // Of psi what the print is judged by: boundaries, whose scatter it is otherwise told by, say nothing of one side.
-  const Eigen::Index psi = fit.unknowns.size() - 1;
-  const double widened = std::max(1.0, std::sqrt(fit.psi_variance / fit.covariance(psi, psi)));
-  fit.covariance.row(psi) *= widened, fit.covariance.col(psi) *= widened;
   fit.covariance *= doubt * doubt;
   return status == Status::ok ? Found{status, std::move(fit), {}} : refusal(status, fit.unknowns);
 }
@@ -76,7 +71,8 @@ Found accepted(const Scene& scene, const LightImage& light, FineFit fit, const E
     fit = fitted(scene, light, fit.unknowns, fit.blur, {processing.ask, fit.bias_px, fit.departure}, budget);
     if (const Status status = validate(scene, fit); status != Status::ok) return refusal(status, fit.unknowns);
     const double moved_rad = std::abs(wrap_pi(fit.unknowns.pose().psi_rad - before_rad));
-    if (moved_rad < rest_sigmas * std::sqrt(fit.psi_variance) && fit.sides_used >= least_sides * fit.sides_in_image)
+    if (moved_rad < rest_sigmas * std::sqrt(fit.psi_variance_rad2()) &&
+        fit.sides_used >= least_sides * fit.sides_in_image)
       return with_doubt_of_one_side(scene, fit);
   }
   return refusal(Status::uncertain, fit.unknowns);
@@ -259,7 +255,7 @@ Found MarkerSearch::look_without_rcm(const SearchFrame& frame, WorkBudget& budge
 // What shows plainly, but elsewhere than the RCM allows.
 Found MarkerSearch::despite_registration(const SearchFrame& frame, bool plain_is_known, WorkBudget& budget) {
   Found free = detect(frame, std::nullopt, free_, budget);
-  if (!free.fit || !contradicts_registration(*free.fit)) return {};
+  if (!free.fit || !contradicts_registration(frame.scene, *free.fit)) return {};
   if (plain_is_known) return free;
   // In this frame a fit through the RCM may be possible where none was before.
   Walk again;

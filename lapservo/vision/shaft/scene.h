@@ -9,11 +9,11 @@
 #include "lapservo/vision/colour/colour_classes.h"
 #include "lapservo/vision/image/image_view.h"
 #include "lapservo/vision/image/lens_field.h"
+#include "lapservo/vision/observation.h"
+#include "lapservo/vision/shaft/print_sides.h"
 #include "lapservo/vision/shaft/shaft_cover.h"
 
 namespace lapservo::internal {
-
-class PrintRecord;
 
 /// One frame and the one instrument that is looked for in it. Borrows everything.
 struct Scene {
@@ -23,8 +23,9 @@ struct Scene {
   const Marker& marker;
   std::array<std::uint8_t, 3> bands;            ///< colour class of each band
   std::span<const ShaftCover* const> others{};  ///< that were found, near enough to hide it or to touch it
-  const PrintRecord* print = nullptr;           ///< what earlier frames showed of its print
+  PrintSides known_sides{};                     ///< from which earlier frames showed that its print is the rig's
   bool among_others = false;                    ///< the colours of one that was not found may touch it
+  double max_p_false = Observation::usual_max_p_false;  ///< TrackerOptions::max_p_false
   LensField field{camera};
 
   /// Where the image says nothing of this instrument: beyond its border, or since another one shows there.

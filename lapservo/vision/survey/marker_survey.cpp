@@ -65,7 +65,7 @@ std::optional<Sighting> refined(const Scene& scene, const LightImage& light, con
                                 const EdgeBlur& blur, const CameraDeparture& departure) {
   const FineFit fine = fit_finely(scene, light, coarse.unknowns, blur, {.departure = departure});
   if (fine.converged)
-    if (auto sighting = sighting_of(scene, fine.unknowns, fine.blur, true, fine.departure)) return sighting;
+    if (auto sighting = sighting_of(scene, fine.as_the_rig_says, fine.blur, true, fine.departure)) return sighting;
   return sighting_of(scene, coarse.unknowns, blur, false, departure);
 }
 
@@ -224,7 +224,7 @@ std::optional<Sighting> ViewMeasurer::settled(const MarkerView& view, const Mark
   const LightImage light(image, light_, ChannelGeometry(view.camera));
   const Scene scene{image, view.camera, classes_, marker, bands_};
   const FineFit fine = fit_finely(scene, light, sighting.unknowns, sighting.blur, {.departure = sighting.departure});
-  return fine.converged ? sighting_of(scene, fine.unknowns, fine.blur, true, fine.departure) : std::nullopt;
+  return fine.converged ? sighting_of(scene, fine.as_the_rig_says, fine.blur, true, fine.departure) : std::nullopt;
 }
 
 }  // namespace lapservo::internal

@@ -1,0 +1,120 @@
+#include "lapservo/vision/model/print_fit.h"
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/testing/ink_aside.h"
+#include "lapservo/testing/scenes.h"
+#include "lapservo/vision/model/fine_fit.h"
+
+namespace lapservo::internal {
+namespace print_fit_test {
+
+using scenes::Shot;
+using scenes::Sight;
+
+constexpr std::uint64_t shots = 6;
+constexpr int psi = 3;
+
+Shot shot_of(const Marker& print, std::uint64_t seed) {
+  Rig printed = scenes::usual_rig();
+  printed.instruments[0].marker = print;
+  return Shot(seed, {}, printed);
+}
+
+// By a rig that has another marker. `hidden`: a boundary of which nothing shows.
+PrintFit fit_of(const Shot& shot, const Marker& believed, std::optional<std::size_t> hidden = {},
+                bool is_known = false) {
+  Rig rig = shot.rig;
+  rig.instruments[0].marker = believed;
+  const Sight sight(rig, shot.bgr);
+  const PoseUnknowns truth = PoseUnknowns::rcm(*rig.instruments[0].camera_from_rcm, shot.q);
+  const EdgeBlur lens;
+  EdgeMeasurements edges = measure_edges(sight.scene(), sight.light(), truth, film_mean_m, {2, 0, 1, 1}, lens);
+  if (hidden) {
+    auto kept = edges.all;
+    kept.clear();
+    for (const Measurement& m : edges.all)
+      if (m.group != *hidden) kept.push_back(m);
+    edges.all = kept;
+  }
+  const ResidualLines lines = residual_lines(edges.all);
+  const CommonErrors errors = common_errors(edges, lines, lens, std::nullopt, {}, {});
+  return fit_print(edges.all, lines, truth.size(), 0, believed, is_known, errors).value();
+}
+
+Marker measured(Marker marker, double sigma_m) {
+  marker.sigmas.bands_upper_m = marker.sigmas.bands_lower_m = std::array{sigma_m, sigma_m, sigma_m};
+  return marker;
+}
+
+TEST(PrintFit, AnExactPrintIsTheRigs) {
+  for (std::uint64_t seed = 1; seed <= shots; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const Shot& shot = scenes::usual_shot(seed);
+    const PrintFit fit = fit_of(shot, shot.rig.instruments[0].marker);
+    EXPECT_LT(fit.off_probability, 0.01);
+    EXPECT_LT(fit.p_false, 1e-6);
+    EXPECT_LT(std::abs(fit.step[psi]), 4 * std::sqrt(fit.covariance(psi, psi)));
+    EXPECT_EQ(fit.psi_variance_by_tolerance, 0);
+  }
+}
+
+// The rest of the print shows that it is not a turn.
+TEST(PrintFit, AnInkAsideIsSeenAndPsiIsRightAllTheSame) {
+  const Marker nominal = scenes::usual_rig().instruments[0].marker;
+  for (const double aside_m : {-0.2e-3, -0.1e-3, 0.1e-3, 0.2e-3})
+    for (std::uint64_t seed = 1; seed <= shots; ++seed) {
+      SCOPED_TRACE("seed " + std::to_string(seed) + ", aside " + std::to_string(1e3 * aside_m));
+      const Shot shot = shot_of(scenes::with_ink_aside(nominal, aside_m), seed);
+      const Sight sight(scenes::usual_rig(), shot.bgr);
+      const FineFit fit = fit_finely(sight.scene(), sight.light(), shot.truth(true), {});
+      EXPECT_GT(fit.off_probability, 0.8);
+      EXPECT_LT(std::abs(wrap_pi(fit.unknowns.q()->psi_rad - shot.q.psi_rad)), 4 * std::sqrt(fit.psi_variance_rad2()));
+    }
+}
+
+// A hidden boundary may lie anywhere, and a print that is off then looks like a turn.
+TEST(PrintFit, WhatHidesABoundaryLeavesPsiInDoubtUnlessThePrintWasMeasured) {
+  for (const std::size_t boundary : {1U, 2U})
+    for (std::uint64_t seed = 1; seed <= shots; ++seed) {
+      SCOPED_TRACE("seed " + std::to_string(seed) + ", boundary " + std::to_string(boundary));
+      const Shot& shot = scenes::usual_shot(seed);
+      const Marker& marker = shot.rig.instruments[0].marker;
+      const auto p_false = [&](const Marker& believed) { return fit_of(shot, believed, boundary).p_false; };
+      EXPECT_GT(p_false(marker), 1e-3);
+      EXPECT_LT(fit_of(shot, marker, boundary, true).p_false, 1e-3) << "seen before";
+      EXPECT_LT(p_false(measured(marker, 1e-5)), 1e-3);
+      EXPECT_GT(p_false(measured(marker, 3e-4)), 1e-3) << "not to within what matters";
+    }
+}
+
+TEST(PrintFit, TheTolerancesShareOfPsisVarianceGrowsWithIt) {
+  const Shot& shot = scenes::usual_shot(1);
+  Marker marker = shot.rig.instruments[0].marker;
+  double before = 0;
+  for (const double tolerance_m : {0.02e-3, 0.05e-3, 0.1e-3}) {
+    marker.tolerance_m = tolerance_m;
+    const PrintFit fit = fit_of(shot, marker);
+    EXPECT_GT(fit.psi_variance_by_tolerance, before);
+    EXPECT_GT(fit.covariance(psi, psi), 0.9 * fit.psi_variance_by_tolerance);
+    before = fit.psi_variance_by_tolerance;
+  }
+}
+
+TEST(PrintFit, AnErrorIsFalseBeyondATenthOfARadian) {
+  EXPECT_NEAR(p_false_of(0, 0.1 * 0.1), 0.3173, 1e-4);
+  EXPECT_NEAR(p_false_of(0.1, 1e-8), 0.5, 1e-9);
+  EXPECT_EQ(p_false_of(-0.3, 0.01), p_false_of(0.3, 0.01));
+  EXPECT_LT(p_false_of(0, 0.02 * 0.02), 1e-6);
+}
+
+}  // namespace print_fit_test
+}  // namespace lapservo::internal
