@@ -516,9 +516,9 @@ std::vector<Dvrk::Event> Dvrk::events() {
        [this] {
          ++operators_faults_;
          // The last of several setpoints within a millisecond counts: again until it was.
-         const SixJoints here = judge_->joints();
-         const SixJoints there = here + SixJoints::Unit(0) * fault_step_rad;
-         for (bool away = true; !judge_->is("FAULT"); away = !away) say_servo_jp(away ? there : here), sleep(0.01);
+         const SixJoints start = judge_->joints();
+         const SixJoints there = start + SixJoints::Unit(0) * fault_step_rad;
+         for (bool away = true; !judge_->is("FAULT"); away = !away) say_servo_jp(away ? there : start), sleep(0.01);
        },
        [this] { disable_home_and_move_to_view(); }, false},
       {"teleoperation", [this] { surgeon_->press(); }, [this] { surgeon_->work_with_clutch_and_release(); }, false},

@@ -35,7 +35,9 @@ struct Fields {
 /// A message as it was sent, the stamp to the microsecond.
 template <typename Message>
 void expect_same(const Message& heard, const Message& sent) {
-  if constexpr (requires { heard.stamp_s; }) EXPECT_NEAR(heard.stamp_s, sent.stamp_s, 1e-6);
+  if constexpr (requires { heard.stamp_s; }) {
+    EXPECT_NEAR(heard.stamp_s, sent.stamp_s, 1e-6);
+  }
   EXPECT_EQ(Fields::of(heard), Fields::of(sent));
 }
 
