@@ -91,7 +91,8 @@ TEST(BlurredBoundary, PsiDoesNotFollowMotionObliqueToTheShaft) {
       ASSERT_TRUE(fit.converged) << "seed " << seed << ", across " << across_px;
       EXPECT_GT(fit.blur.correlation * across_px, 0.7 * 6) << "seed " << seed;
       const double error_rad = wrap_pi(fit.unknowns.pose().psi_rad - shot.q.psi_rad);
-      EXPECT_LT(error_rad * error_rad, 2.5 * 2.5 * fit.psi_variance_rad2()) << "seed " << seed << ", across " << across_px;
+      EXPECT_LT(error_rad * error_rad, 2.5 * 2.5 * fit.psi_variance_rad2())
+          << "seed " << seed << ", across " << across_px;
       apart_rad += (across_px > 0 ? 1 : -1) * error_rad / shots;
     }
   EXPECT_LT(std::abs(apart_rad), 0.004);
