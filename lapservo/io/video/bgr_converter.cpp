@@ -1,6 +1,5 @@
 #include "lapservo/io/video/bgr_converter.h"
 
-#include <map>
 #include <utility>
 
 extern "C" {
@@ -17,19 +16,37 @@ struct Place {
 };
 
 Place place_of(ChromaSite site) {
-  static const std::map<ChromaSite, Place> places{
-      {ChromaSite::left, {0, 128}}, {ChromaSite::centre, {128, 128}},    {ChromaSite::top_left, {0, 0}},
-      {ChromaSite::top, {128, 0}},  {ChromaSite::bottom_left, {0, 256}}, {ChromaSite::bottom, {128, 256}}};
-  return places.at(site);
+  switch (site) {
+    case ChromaSite::left:
+      return {0, 128};
+    case ChromaSite::centre:
+      return {128, 128};
+    case ChromaSite::top_left:
+      return {0, 0};
+    case ChromaSite::top:
+      return {128, 0};
+    case ChromaSite::bottom_left:
+      return {0, 256};
+    case ChromaSite::bottom:
+      return {128, 256};
+  }
+  return {};
 }
 
 int coefficients_of(YuvMatrix matrix) {
-  static const std::map<YuvMatrix, int> coefficients{{YuvMatrix::bt601, SWS_CS_ITU601},
-                                                     {YuvMatrix::bt709, SWS_CS_ITU709},
-                                                     {YuvMatrix::bt2020, SWS_CS_BT2020},
-                                                     {YuvMatrix::fcc, SWS_CS_FCC},
-                                                     {YuvMatrix::smpte240m, SWS_CS_SMPTE240M}};
-  return coefficients.at(matrix);
+  switch (matrix) {
+    case YuvMatrix::bt601:
+      return SWS_CS_ITU601;
+    case YuvMatrix::bt709:
+      return SWS_CS_ITU709;
+    case YuvMatrix::bt2020:
+      return SWS_CS_BT2020;
+    case YuvMatrix::fcc:
+      return SWS_CS_FCC;
+    case YuvMatrix::smpte240m:
+      return SWS_CS_SMPTE240M;
+  }
+  return SWS_CS_ITU601;
 }
 
 bool is_rgb(const AVPixFmtDescriptor& format) {

@@ -1,7 +1,5 @@
 #include "lapservo/io/video/yuv_picture.h"
 
-#include <map>
-
 extern "C" {
 #include <libavutil/imgutils.h>
 }
@@ -14,11 +12,21 @@ namespace {
 
 AVPixelFormat format_of(YuvPicture::Layout layout) {
   using Layout = YuvPicture::Layout;
-  static const std::map<Layout, AVPixelFormat> formats{
-      {Layout::yuyv, AV_PIX_FMT_YUYV422},       {Layout::uyvy, AV_PIX_FMT_UYVY422},
-      {Layout::nv12, AV_PIX_FMT_NV12},          {Layout::planar_420, AV_PIX_FMT_YUV420P},
-      {Layout::planar_422, AV_PIX_FMT_YUV422P}, {Layout::planar_444, AV_PIX_FMT_YUV444P}};
-  return formats.at(layout);
+  switch (layout) {
+    case Layout::yuyv:
+      return AV_PIX_FMT_YUYV422;
+    case Layout::uyvy:
+      return AV_PIX_FMT_UYVY422;
+    case Layout::nv12:
+      return AV_PIX_FMT_NV12;
+    case Layout::planar_420:
+      return AV_PIX_FMT_YUV420P;
+    case Layout::planar_422:
+      return AV_PIX_FMT_YUV422P;
+    case Layout::planar_444:
+      return AV_PIX_FMT_YUV444P;
+  }
+  return AV_PIX_FMT_NONE;
 }
 
 }  // namespace
