@@ -18,7 +18,7 @@ struct ValidationLimits {
   /// And of psi as it is told, with what one side alone or a turn within the exposure add.
   double max_sigma_told_rad = 0.04;
   double certainly_off = 0.9;  ///< probability from which on the print is to blame
-  /// Times what the rig's tolerance_m adds to the variance: who sets it wants to live with it.
+  /// Times what the rig's tolerance_m adds to the variance and to p_false: who sets it wants to live with it.
   double tolerance_slack = 1.5;
   double well_seen_fraction = 0.7;  ///< of the boundary points, to blame the print
 

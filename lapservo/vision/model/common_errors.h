@@ -26,7 +26,7 @@ struct UsualErrors {
   double usual_side_blur_px = 1.05, side_of_blur = 1.4, leaning_of_blur = 0.035;
   /// And as a fraction of what the camera's processing moves a boundary by, which is known so well; where colours are
   /// clipped beside boundaries, the larger one. A processing that moves them by doubted_processing_px (rms) doubles the
-  /// noise where a hidden boundary's print is asked for, and what `calibrate marker` says.
+  /// noise that `calibrate marker` takes.
   double fraction_of_processing = 0.13, fraction_of_clipped = 0.3, doubted_processing_px = 0.1;
   /// By so much of it (rms) sides are off, too, and what is left of all boundaries is moved, leaning and bowed alike,
   /// of which psi feels little: without, phi had up to 2.5 of its sigmas in pictures with 4:2:0, and theta 2.2.
@@ -71,8 +71,8 @@ struct CommonErrors {
 /// What a boundary of this blur as a whole may be off beside a camera's processing, on a shaft of this radius.
 double common_boundary_px(double blur_px, double radius_px);
 
-/// By how much noise is to be taken larger before a print is blamed: compression, motion blur and a camera's processing
-/// move edges of this sigma, which were blurred by this and moved by this.
+/// By how much `calibrate marker` takes noise larger: compression, motion blur and a camera's processing move edges of
+/// this sigma, which were blurred by this and moved by this.
 double doubt_scale(double sigma_px, double blur_px, double bias_px);
 
 /// What each boundary and side as a whole may be off, and the noise as it is. `bias_px`: by how much the camera's

@@ -183,7 +183,6 @@ void Fitter::take_processing_off(const ProcessedEdges& edges) {
 void Fitter::judge() {
   fit_.turn = turn_blur(pass_, located_with_, fit_.processing == Processing::found);
   fit_.lines = pass_.lines;
-  fit_.radius_px = pass_.radius_px;
   fit_.in_image = pass_.in_image;
   fit_.sides_in_image = pass_.sides_in_image;
   const ResidualLines lines = residual_lines(pass_.all);

@@ -36,7 +36,6 @@ struct FineFit {
   PoseUnknowns as_the_rig_says;  ///< the pose, were the print exactly so
   UnknownMatrix covariance;      ///< of the unknowns, one sigma squared
   EdgeBlur blur;
-  double radius_px = 0;           ///< the shaft's
   int lines = 0;                  ///< generatrices looked at
   std::array<int, 4> used{};      ///< of them, lines on which the boundary was located and agrees with the fit
   std::array<int, 4> in_image{};  ///< lines on which the boundary lies inside the image and off the seam

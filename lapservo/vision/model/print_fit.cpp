@@ -21,18 +21,17 @@ PrintShapes doubted_shapes_mm(const PrintDoubt& doubt, const PrintSums& sums, co
   return shapes_of(doubt, sums.equations.nn, weights, marker);
 }
 
-// A size of errors, and how likely it is.
+// A size of errors beyond the tolerance, and how likely it is.
 struct Hypothesis {
-  PrintPrior prior;
+  PrintPrior prior;  // with the tolerance
+  bool is_off = false;
   double weight = 0;
-
-  bool is_off() const { return std::max(prior.bands_mm, prior.ink_mm) >= limits.off_mm; }
 };
 constexpr std::size_t hypotheses = (1 + limits.bands.size()) * (1 + limits.inks.size());
 using Hypotheses = InplaceVector<Hypothesis, hypotheses>;
 
-// The first is the rig's print.
-Hypotheses prior_hypotheses(bool is_known) {
+// The first is the rig's print. Every print's bands are off by the tolerance.
+Hypotheses prior_hypotheses(double tolerance_mm, bool is_known) {
   const auto fraction_of = [&](const ErrorSize& size) {
     return is_known && size.mm >= limits.off_mm ? limits.fraction_of_known : size.fraction;
   };
@@ -43,23 +42,23 @@ Hypotheses prior_hypotheses(bool is_known) {
   };
   const double ink_right = right(limits.inks);
   Hypotheses all;
+  const auto add = [&](double bands_mm, double ink_mm, double weight) {
+    all.push_back({{std::hypot(bands_mm, tolerance_mm), ink_mm}, std::max(bands_mm, ink_mm) >= limits.off_mm, weight});
+  };
   const auto add_inks = [&](double bands_mm, double weight) {
-    all.push_back({{bands_mm, 0}, weight * ink_right});
-    for (const ErrorSize& ink : limits.inks) all.push_back({{bands_mm, ink.mm}, weight * fraction_of(ink)});
+    add(bands_mm, 0, weight * ink_right);
+    for (const ErrorSize& ink : limits.inks) add(bands_mm, ink.mm, weight * fraction_of(ink));
   };
   add_inks(0, right(limits.bands));
   for (const ErrorSize& bands : limits.bands) add_inks(bands.mm, fraction_of(bands));
   return all;
 }
 
-// Weighted by how likely the residuals are; the weights add up to 1. Every print's bands are off by the tolerance.
-Hypotheses weighted(const PrintInformation& evidence, const Marker& marker, bool is_known) {
-  const double tolerance_mm = marker.tolerance_m / mm_in_m;
+// Weighted by how likely the residuals are; the weights add up to 1.
+Hypotheses weighted(Hypotheses all, const PrintInformation& evidence) {
   const PrintEvidence of(evidence);
-  Hypotheses all = prior_hypotheses(is_known || marker.bands_are_measured());
   std::array<double, hypotheses> gains;
-  for (std::size_t i = 0; i < hypotheses; ++i)
-    gains[i] = of.gain({std::hypot(all[i].prior.bands_mm, tolerance_mm), all[i].prior.ink_mm});
+  for (std::size_t i = 0; i < hypotheses; ++i) gains[i] = of.gain(all[i].prior);
   const double best = *std::max_element(gains.begin(), gains.end());
   double sum = 0;
   for (std::size_t i = 0; i < hypotheses; ++i) sum += all[i].weight *= std::exp(gains[i] - best);
@@ -123,14 +122,12 @@ std::optional<AsTheRigSays> solved_as_the_rig_says(const PrintSums& sums, double
   return out;
 }
 
-std::optional<Mixture> mixed(const PrintSums& sums, const PrintSolution& as_the_rig_says, const Hypotheses& all,
-                             double tolerance_mm) {
+std::optional<Mixture> mixed(const PrintSums& sums, const PrintSolution& as_the_rig_says, const Hypotheses& all) {
   Mixture mixture(static_cast<int>(as_the_rig_says.step.size()));
   mixture.add(as_the_rig_says, all[0].weight);
   for (std::size_t i = 1; i < all.size(); ++i) {
     if (all[i].weight < limits.min_weight) continue;
-    const PrintPrior& prior = all[i].prior;
-    const auto off = solved_with_print(sums, {std::hypot(prior.bands_mm, tolerance_mm), prior.ink_mm});
+    const auto off = solved_with_print(sums, all[i].prior);
     if (!off) return std::nullopt;
     mixture.add(*off, all[i].weight);
   }
@@ -140,7 +137,7 @@ std::optional<Mixture> mixed(const PrintSums& sums, const PrintSolution& as_the_
 double off_probability(const Hypotheses& all) {
   double sum = 0;
   for (const Hypothesis& hypothesis : all)
-    if (hypothesis.is_off()) sum += hypothesis.weight;
+    if (hypothesis.is_off) sum += hypothesis.weight;
   return sum;
 }
 
@@ -159,21 +156,24 @@ std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const Res
   if (!as_the_rig_says) return std::nullopt;
   // Nothing, where the frame tells nothing of the print.
   const PrintInformation print = information_of(sums).value_or(PrintInformation{});
-  const Hypotheses all = weighted(doubted(print, doubted_shapes_mm(errors.doubt, sums, marker)), marker, is_known);
-  const auto mixture = mixed(sums, as_the_rig_says->tolerated, all, tolerance_mm);
+  const PrintInformation evidence = doubted(print, doubted_shapes_mm(errors.doubt, sums, marker));
+  const Hypotheses all = weighted(prior_hypotheses(tolerance_mm, is_known || marker.bands_are_measured()), evidence);
+  const auto mixture = mixed(sums, as_the_rig_says->tolerated, all);
   if (!mixture) return std::nullopt;
   const PrintSolution mean = mixture->mean();
   for (Measurement& m : measurements) m.residual_px -= m.row.dot(mean.step) + print_shift_px(m, mean.print_mm);
-  const int psi = pose_unknowns - 1;
+  const auto psi_variance = [psi = pose_unknowns - 1](const PrintSolution& solution) {
+    return solution.covariance(psi, psi);
+  };
+  const double tolerated_rad2 = psi_variance(as_the_rig_says->tolerated);
   PrintFit fit;
   fit.step = mean.step;
   fit.step_as_the_rig_says = as_the_rig_says->tolerated.step;
   fit.covariance = mean.covariance.topLeftCorner(pose_unknowns, pose_unknowns);
   fit.off_probability = off_probability(all);
   fit.p_false = mixture->p_false();
-  fit.p_false_by_tolerance = p_false_of(0, as_the_rig_says->tolerated.covariance(psi, psi));
-  fit.psi_variance_by_tolerance =
-      as_the_rig_says->tolerated.covariance(psi, psi) - as_the_rig_says->exact.covariance(psi, psi);
+  fit.p_false_by_tolerance = p_false_of(0, tolerated_rad2);
+  fit.psi_variance_by_tolerance = tolerated_rad2 - psi_variance(as_the_rig_says->exact);
   return fit;
 }
 
