@@ -1,6 +1,7 @@
 // accuracy_study STUDY [FRAMES [SEED [ROW...]]]: accuracy and normalised errors of the tracker, a row for each
 // condition of the study (camera, samples, blood or motion: accuracy_study.h), all of them without ROW. Tables of
-// docs/notes/accuracy.md. The study "edges" is of single boundaries and sides (docs/notes/edges.md).
+// docs/notes/accuracy.md. The study "edges" is of single boundaries and sides (docs/notes/edges.md),
+// "hostile" counts false accepts.
 #include "bench/accuracy_study.h"
 
 #include <algorithm>
@@ -59,8 +60,9 @@ int main(int argc, char** argv) {
   const int frames = argc > 2 ? std::atoi(argv[2]) : 40;
   const std::uint64_t seed = argc > 3 ? static_cast<std::uint64_t>(std::atoll(argv[3])) : 1;
   if (name == "edges") return print_edge_errors(frames, seed), 0;
+  if (name == "hostile") return print_false_accepts(frames, seed), 0;
   const auto study = studies.find(name);
   if (study == studies.end())
-    return std::fputs("accuracy_study camera|samples|blood|motion|edges [FRAMES [SEED [ROW...]]]\n", stderr), 2;
+    return std::fputs("accuracy_study camera|samples|blood|motion|edges|hostile [FRAMES [SEED [ROW...]]]\n", stderr), 2;
   return run(study->second(), frames, seed, {argv + std::min(argc, 4), argv + argc});
 }
