@@ -107,21 +107,19 @@ bool SurfaceTracker::may_touch_another_lost(std::size_t i) const {
   return false;
 }
 
-// What others hide of it, or show beside it, matters only where it can't be followed without, or could not last time.
+// What others hide of it matters only where it can't be followed without, or could not last time.
 Found SurfaceTracker::follow_known(const ImageView& image, const LightImage& light, std::size_t i, WorkBudget& budget) {
   const InstrumentMemory& memory = *memory_[i];
-  const auto follow_it = [&](bool among_others) {
-    Scene scene = scene_of(image, i);
-    scene.among_others = among_others;
-    Found found = follow(scene, light, memory.expected_pose(now_s_), memory.blur, memory.expected_processing(), budget);
-    scene.among_others = false;
-    found.among_others = among_others && found.fit && (!others_.empty() || validate(scene, *found.fit) != Status::ok);
+  const auto follow_it = [&] {
+    Found found = follow(scene_of(image, i), light, memory.expected_pose(now_s_), memory.blur,
+                         memory.expected_processing(), budget);
+    found.among_others = found.fit && !others_.empty();
     return found;
   };
   others_.clear();
   if (memory.among_others) cover_expected(i, budget);
-  Found found = follow_it(memory.among_others);
-  if (!found.fit && !memory.among_others && cover_expected(i, budget)) found = follow_it(true), followed_twice_ = true;
+  Found found = follow_it();
+  if (!found.fit && !memory.among_others && cover_expected(i, budget)) found = follow_it(), followed_twice_ = true;
   if (found.fit) covers_[i].clear();  // where it was expected
   const auto& camera_from_rcm = rig_.instruments[i].camera_from_rcm;
   if (found.fit && !found.fit->unknowns.q() && camera_from_rcm)

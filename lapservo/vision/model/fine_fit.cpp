@@ -225,12 +225,10 @@ void Fitter::count_inliers() {
 }
 
 void Fitter::tell(const PrintFit& print) {
-  const double doubt =
-      1 + fine_fit_limits.doubt_of_hidden * std::max(0.0, fine_fit_limits.usual_fraction - fit_.located_fraction());
-  fit_.covariance = doubt * doubt * print.covariance;
+  fit_.covariance = print.covariance;
   fit_.off_probability = print.off_probability;
   fit_.p_false = print.p_false, fit_.p_false_by_tolerance = print.p_false_by_tolerance;
-  fit_.psi_variance_by_tolerance = doubt * doubt * print.psi_variance_by_tolerance;
+  fit_.psi_variance_by_tolerance = print.psi_variance_by_tolerance;
   fit_.converged = true;
 }
 

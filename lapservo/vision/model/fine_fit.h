@@ -13,11 +13,8 @@
 
 namespace lapservo::internal {
 
-/// How a fine fit settles, and how sure it is of what is hidden.
+/// How a fine fit settles.
 struct FineFitLimits {
-  /// Where less than the usual fraction of a marker shows, some of what was taken for its boundaries are the blood's:
-  /// sigma grows by so much for all that is missing.
-  double usual_fraction = 0.7, doubt_of_hidden = 4;
   /// What a point may be off beside its noise and still agrees with the fit: edges of blood beside a boundary move it.
   double tolerated_px = 0.037;
   double settled_px = 1.5;    ///< a pass that moves no point farther is the last

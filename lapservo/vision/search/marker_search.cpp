@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "lapservo/core/angles.h"
-#include "lapservo/vision/accept/displaced_boundary.h"
 #include "lapservo/vision/accept/verification.h"
 #include "lapservo/vision/search/coarse_fit.h"
 #include "lapservo/vision/search/initial_pose.h"
@@ -54,15 +53,11 @@ FineFit fitted(const Scene& scene, const LightImage& light, const PoseUnknowns& 
   return fit;
 }
 
-// A fit that is ok, unless a boundary shows elsewhere. One side alone holds the place of a shaft that is cut along, and
+// A fit that is ok. One side alone holds the place of a shaft that is cut along, and
 // where the robust loss takes that for an outlier at first, fits stop short of it by 20 mrad, six sigma: they go on
 // until psi rests and the side agrees.
 Found accepted(const Scene& scene, const LightImage& light, FineFit fit, const ExpectedProcessing& processing,
                WorkBudget& budget) {
-  if (may_be_displaced(fit)) {
-    budget.spend(costs.fine_pass);
-    if (is_displaced(scene, light, fit)) return refusal(Status::marker_mismatch, fit.unknowns);
-  }
   if (!cut_along(scene, fit.unknowns.pose())) return {Status::ok, std::move(fit), {}};
   constexpr int most = 4;
   constexpr double rest_sigmas = 0.2, least_sides = 0.8;
@@ -312,8 +307,8 @@ Found MarkerSearch::hidden(const SearchFrame& frame, WorkBudget& budget) {
 }
 
 // The starts of a shared blob, until one fits. One behind another that was found needs not show all bands.
-Found MarkerSearch::among_others_in(const SearchFrame& frame, const Scene& scene, const Blob& blob,
-                                    WorkBudget& budget) {
+Found MarkerSearch::among_others_in(const SearchFrame& frame, const Blob& blob, WorkBudget& budget) {
+  const Scene& scene = frame.scene;
   Found best;
   budget.spend(costs.bands_in_order);
   const bool may_show = !scene.others.empty() || shows_bands_in_order(scene, blob, *frame.camera_from_rcm);
@@ -338,11 +333,9 @@ Found MarkerSearch::among_others_in(const SearchFrame& frame, const Scene& scene
 }
 
 Found MarkerSearch::among_others(const SearchFrame& frame, WorkBudget& budget) {
-  Scene scene = frame.scene;
-  scene.among_others = true;
   Found best;
   for (const Blob* blob : among_others_.blobs.rest(frame.shared, reach_px(frame))) {
-    Found found = among_others_in(frame, scene, *blob, budget);
+    Found found = among_others_in(frame, *blob, budget);
     if (found.fit || found.status == Status::marker_mismatch) {
       among_others_.done = found.among_others = true;
       return found;

@@ -69,7 +69,7 @@ class MarkerSearch {
   Found look_long(const SearchFrame& frame, bool is_mismatch, bool plain_is_known, WorkBudget& budget);
   Found despite_registration(const SearchFrame& frame, bool plain_is_known, WorkBudget& budget);
   Found among_others(const SearchFrame& frame, WorkBudget& budget);
-  Found among_others_in(const SearchFrame& frame, const Scene& scene, const Blob& blob, WorkBudget& budget);
+  Found among_others_in(const SearchFrame& frame, const Blob& blob, WorkBudget& budget);
   Found hidden(const SearchFrame& frame, WorkBudget& budget);
   bool finish_agreement(const SearchFrame& frame, WorkBudget& budget);
   bool fit_to_results(const SearchFrame& frame, WorkBudget& budget);

@@ -24,7 +24,6 @@ struct Scene {
   std::array<std::uint8_t, 3> bands;            ///< colour class of each band
   std::span<const ShaftCover* const> others{};  ///< that were found, near enough to hide it or to touch it
   PrintSides known_sides{};                     ///< from which earlier frames showed that its print is the rig's
-  bool among_others = false;                    ///< the colours of one that was not found may touch it
   double max_p_false = Observation::usual_max_p_false;  ///< TrackerOptions::max_p_false
   LensField field{camera};
 

@@ -18,7 +18,7 @@ namespace lapservo::internal {
 namespace {
 
 // A print that is off by half a millimetre leaves nine tenths of the surface with the colour that the rig's would have.
-constexpr double min_matching = 0.6, max_wrong = 0.15, max_beside = 0.2;
+constexpr double min_matching = 0.6, max_wrong = 0.15;
 // Where boundaries are measured, what blurs luma is light's blur: libx264 hardly blurs it after the response, but a fit
 // of its wide and ragged blur of colour differences takes some, and then moves e2 by 0.155 px for 0.1.
 // A gradient of light is taken for none: of a turn they cancel, and what a fit of one video picture gives for it moves
@@ -54,9 +54,7 @@ std::optional<Sighting> sighting_of(const Scene& scene, const PoseUnknowns& unkn
   const auto tau_rad = facing_tau_rad(scene.marker, pose);
   if (!tau_rad) return std::nullopt;
   const ColourAgreement agreement = colour_agreement(scene, pose);
-  if (agreement.in_image < 0.9 || agreement.matching < min_matching || agreement.wrong > max_wrong ||
-      agreement.beside > max_beside)
-    return std::nullopt;
+  if (agreement.in_image < 0.9 || agreement.matching < min_matching || agreement.wrong > max_wrong) return std::nullopt;
   return Sighting{unknowns, blur, film_mean_m, *tau_rad, settled, departure};
 }
 

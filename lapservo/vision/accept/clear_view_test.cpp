@@ -1,4 +1,4 @@
-#include "lapservo/vision/accept/colour_evidence.h"
+#include "lapservo/vision/accept/clear_view.h"
 
 #include <cstddef>
 #include <cstdint>
@@ -8,14 +8,12 @@
 #include <opencv2/imgproc.hpp>
 
 #include "lapservo/core/angles.h"
-#include "lapservo/core/random.h"
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/marker/azimuths.h"
 #include "lapservo/testing/scenes.h"
-#include "lapservo/vision/accept/verification.h"
 
 namespace lapservo::internal {
-namespace colour_evidence_test {
+namespace clear_view_test {
 namespace {
 
 using scenes::Shot;
@@ -43,7 +41,7 @@ cv::Mat with_blood_along(const Shot& shot, std::size_t boundary) {
   return bloody;
 }
 
-TEST(ColourEvidence, NothingHidesABoundaryButBlood) {
+TEST(ClearView, NothingHidesABoundaryButBlood) {
   constexpr int lines = 40;
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
@@ -60,25 +58,6 @@ TEST(ColourEvidence, NothingHidesABoundaryButBlood) {
   }
 }
 
-TEST(ColourEvidence, WhatSpillsIsAnEndElsewhereAndNoNoise) {
-  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
-    SCOPED_TRACE("seed " + std::to_string(seed));
-    const Shot& shot = usual_shot(seed);
-    const ShaftPose right = moved_along(shot, 0);
-    EXPECT_LT(spilled_in_patches(shot.sight.scene(), right), 0.02);
-    EXPECT_GT(spilled_in_patches(shot.sight.scene(), moved_along(shot, 2e-3)), 0.5);
-    // A fifth of all pixels with the end's colour, no two of them neighbours but by chance.
-    cv::Mat noisy = shot.bgr.clone();
-    Random random(seed);
-    for (int v = 0; v < noisy.rows; ++v)
-      for (int u = 0; u < noisy.cols; ++u)
-        if (random.uniform(0, 1) < 0.2) noisy.at<cv::Vec3b>(v, u) = {200, 20, 110};
-    const Sight sight(shot.rig, noisy);
-    EXPECT_GT(colour_agreement(sight.scene(), right).spilled, 0.12);
-    EXPECT_LT(spilled_in_patches(sight.scene(), right), 0.12);
-  }
-}
-
 }  // namespace
-}  // namespace colour_evidence_test
+}  // namespace clear_view_test
 }  // namespace lapservo::internal
