@@ -84,6 +84,7 @@ ColourAgreement colour_agreement(const Scene& scene, const ShaftPose& pose) {
   const double length_m = scene.marker.length_m();
   const double guard_m =
       length_m * std::max(min_guard, blurred_px / length_in_image_px(scene, pose, view->facing_azimuth_rad));
+  const Eigen::Vector3d axis = pose.camera_from_unrolled.rotation * Eigen::Vector3d::UnitZ();
   int total = 0, inside = 0, matching = 0, wrong = 0;
   for (int i = 0; i < azimuths; ++i) {
     const double azimuth_rad = visible_azimuth_rad(*view, reach, i, azimuths);
@@ -91,14 +92,14 @@ ColourAgreement colour_agreement(const Scene& scene, const ShaftPose& pose) {
     if (scene.marker.gap_rad > 0 && distance_to_seam_rad(scene.marker, tau_rad) * scene.marker.radius_m() < guard_m)
       continue;
     const auto ends_m = boundaries_m(scene.marker, tau_rad);
+    const Eigen::Vector3d base = pose.camera_from_unrolled * surface_point(scene.marker.radius_m(), azimuth_rad, 0);
     for (int k = 0; k < places; ++k) {
       const double along_m = length_m * (k + 0.5) / places;
       const auto is_near = [&](double end_m) { return std::abs(end_m - along_m) < guard_m; };
       if (std::any_of(ends_m.begin(), ends_m.end(), is_near)) continue;
       ++total;
       const std::size_t band = along_m < ends_m[1] ? 0 : along_m < ends_m[2] ? 1 : 2;
-      const std::uint8_t colour = scene.class_on_shaft(pose.camera_from_unrolled *
-                                                       surface_point(scene.marker.radius_m(), azimuth_rad, along_m));
+      const std::uint8_t colour = scene.class_on_shaft(base + along_m * axis);
       if (colour == Scene::outside) continue;
       const bool match = colour == scene.bands[band];
       ++inside, matching += match, wrong += scene.is_ours(colour) && !match;
