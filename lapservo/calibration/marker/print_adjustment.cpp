@@ -163,9 +163,9 @@ struct EdgeCost {
 double common_sigma_px(std::size_t group, const ViewMeasurements& frame) {
   const double more_px = usual_errors.common_fraction_of_blur * std::max(0.0, frame.blur_px - usual_blur_px);
   if (group >= measurement_groups) return common_seam_px + more_px;
-  const double usual_px =
-      group < 4 ? common_boundary_px(frame.blur_px, frame.edges.radius_px) : usual_errors.common_side_px + more_px;
-  return std::hypot(usual_px, usual_errors.fraction_of_processing * frame.bias_px[group]);
+  if (group >= 4) return usual_errors.common_side_px + more_px;
+  return std::hypot(common_boundary_px(frame.blur_px, frame.edges.radius_px),
+                    usual_errors.fraction_of_processing * frame.bias_px[group]);
 }
 
 std::vector<EdgeCost> add_frame(ceres::Problem& problem, const ViewMeasurements& measured, const PrintShape& shape,

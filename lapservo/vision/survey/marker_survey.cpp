@@ -7,12 +7,10 @@
 #include <opencv2/imgproc.hpp>
 
 #include "lapservo/core/statistics.h"
-#include "lapservo/geometry/cylinder.h"
 #include "lapservo/vision/accept/verification.h"
 #include "lapservo/vision/image/light_image.h"
 #include "lapservo/vision/search/coarse_fit.h"
 #include "lapservo/vision/search/initial_pose.h"
-#include "lapservo/vision/survey/side_biases.h"
 
 namespace lapservo::internal {
 namespace {
@@ -136,25 +134,26 @@ std::optional<MarkerView> cropped_view(const cv::Mat& bgr, const Camera& camera,
 }
 
 void take_processing_off(std::vector<ViewMeasurements>& views) {
-  constexpr std::size_t groups = measurement_groups;
-  const auto told = [](const ViewMeasurements& view, std::size_t group) -> std::optional<double> {
-    if (!view.processing.edges) return std::nullopt;
-    return group < 4 ? view.processing.edges->bias_px[group] : view.side_biases_px[group - 4];
-  };
+  constexpr std::size_t groups = 4;
   std::array<std::vector<double>, groups> told_px;
   std::ptrdiff_t asked = 0;
   for (const ViewMeasurements& view : views) {
     if (view.processing.processing != Processing::unknown) ++asked;
+    if (!view.processing.edges) continue;
     for (std::size_t k = 0; k < groups; ++k)
-      if (const auto bias_px = told(view, k)) told_px[k].push_back(*bias_px);
+      if (const auto bias_px = view.processing.edges->bias_px[k]) told_px[k].push_back(*bias_px);
   }
   std::array<double, groups> usual_px{};
   for (std::size_t k = 0; k < groups; ++k)
     if (2 * std::ssize(told_px[k]) > asked) usual_px[k] = median(told_px[k]);
   for (ViewMeasurements& view : views) {
     if (view.processing.processing == Processing::none) continue;
-    for (std::size_t k = 0; k < groups; ++k) view.bias_px[k] = told(view, k).value_or(usual_px[k]);
-    for (Measurement& m : view.edges.all) m.residual_px -= view.bias_px[m.group];
+    view.bias_px = usual_px;
+    if (view.processing.edges)
+      for (std::size_t k = 0; k < groups; ++k)
+        view.bias_px[k] = view.processing.edges->bias_px[k].value_or(usual_px[k]);
+    for (Measurement& m : view.edges.all)
+      if (m.group < groups) m.residual_px -= view.bias_px[m.group];
   }
 }
 
@@ -195,7 +194,7 @@ ViewMeasurements ViewMeasurer::measure(const MarkerView& view, const Marker& mar
     return measure_seam(scene, light, sighting.unknowns, sighting.blur.boundaries_px(), reach.seam_m, reach.free_gap,
                         processing, grey);
   };
-  if (processing && reach.only_video) {
+  if (processing) {
     const cv::Mat grey = grey_of(view.bgr);
     const ImageView grey_image(grey);
     const LightImage grey_light(grey_image, light.light_of_value());
@@ -203,12 +202,8 @@ ViewMeasurements ViewMeasurer::measure(const MarkerView& view, const Marker& mar
     take_sides(measure_edges(grey_scene, grey_light, sighting.unknowns, sighting.film_m,
                              {reach.extra_px, reach.extra_px, iterations, 1}, sighting.blur),
                measured.edges);
-    measured.seam = seam_by(&grey_light);
+    measured.seam = seam_by(reach.only_video ? &grey_light : nullptr);
   } else {
-    const auto cylinder = view_cylinder(sighting.unknowns.pose().camera_from_unrolled, marker.radius_m());
-    if (processing && cylinder)
-      measured.side_biases_px = side_biases_px(light, measured.edges.all, *processing, sighting.blur,
-                                               marker.radius_m() / cylinder->camera_to_axis_m * view.camera.fx_px);
     measured.seam = seam_by(nullptr);
   }
   measured.blur_px = std::max(sighting.blur.boundaries_px(), sighting.blur.sides_px);

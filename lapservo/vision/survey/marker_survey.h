@@ -64,10 +64,7 @@ struct ViewMeasurements {
   double blur_px = 1.2, film_m = film_mean_m;  ///< that they were measured with
   double turned_rad = 0;                       ///< about the axis since the frame before; the caller's to say
   ProcessingEvidence processing;               ///< unknown when not asked
-  /// What it moves the sides by, where it is found and they tell.
-  std::array<std::optional<double>, 2> side_biases_px{};
-  /// Taken off the boundaries and the sides.
-  std::array<double, measurement_groups> bias_px{};
+  std::array<double, 4> bias_px{};             ///< taken off the boundaries; sides are measured in grey values then
 };
 
 /// Takes off each view's boundaries and sides what the camera's processing moved them by (picture_processing.h). Views
