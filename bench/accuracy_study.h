@@ -34,9 +34,9 @@ std::vector<acceptance::TrueFrame> motion_frames(const std::string& name, int fr
 /// Prints how far boundaries and sides are located from where the true pose has them: of UsualErrors and EdgeLimits.
 void print_edge_errors(int frames, std::uint64_t seed);
 
-/// Prints how many hostile frames are ok and wrong by 0.1 rad about the shaft. Each has one to three hardships: a misprint,
-/// blood, a camera's processing, another instrument across, a small marker, motion, soft and dim images, a wrong rig.
-/// And how often psi is wrong by what p_false says of it.
+/// Prints how many hostile frames are ok and wrong by 0.1 rad about the shaft. Each has one to three hardships: a
+/// misprint, blood, a camera's processing, another instrument across, a small marker, motion, soft and dim images, a
+/// wrong rig. And how often psi is wrong by what p_false says of it.
 void print_false_accepts(int frames, std::uint64_t seed);
 
 /// The truth for a tracker whose rig has this print. The seam's displacement shows in no image and counts for no error.
