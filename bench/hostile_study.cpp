@@ -77,17 +77,12 @@ void make_wrong(Rig& rig, Random& random) {
   }
 }
 
-struct HostileFrame {
-  Hardships hardships;
-  TrueFrame frame;
-};
-
-// The rig's prints, in view; a marker that is smaller in the image is one of a thinner instrument or farther away.
 struct Placed {
   Rig rig;
   std::vector<JointVector> q;
 };
 
+// In view; a marker that is smaller in the image is one of a thinner instrument or farther away.
 Placed placed(Hardships drawn, Random& random) {
   constexpr double nearest_m = 0.075, farthest_m = 0.115, steepest_rad = 0.5, border_px = 30;
   Placed out{scenes::usual_rig(drawn[crossing] ? 2 : 1), {}};
@@ -133,6 +128,11 @@ cv::Mat exposed(const Placed& at, Hardships drawn, Random& random) {
       .render_exposure(exposure, random.bits());
 }
 
+struct HostileFrame {
+  Hardships hardships;
+  TrueFrame frame;
+};
+
 HostileFrame draw_frame(std::uint64_t seed) {
   Random random(seed);
   const Hardships drawn = draw_hardships(random);
@@ -149,7 +149,7 @@ HostileFrame draw_frame(std::uint64_t seed) {
   return {drawn, std::move(frame)};
 }
 
-// Markers, and how many were taken for ok; wrong: off by 0.1 rad about the shaft, whatever the registration says.
+// About the shaft, whatever the registration says.
 double error_rad(const Observation& seen, const Truth& truth) {
   return wrap_pi(seen.tau_rad - truth.tau_rad);
 }
@@ -158,6 +158,7 @@ bool is_wrong(const Observation& seen, const Truth& truth) {
   return seen.status == Status::ok && std::abs(error_rad(seen, truth)) > Observation::false_rad;
 }
 
+// Markers, how many are ok, and how many of these wrong.
 struct Count {
   int markers = 0, ok = 0, wrong = 0;
   void add(const Observation& seen, const Truth& truth) {

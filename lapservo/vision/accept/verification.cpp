@@ -51,6 +51,11 @@ bool misses_a_boundary(const Scene& scene, const FineFit& fit) {
   return false;
 }
 
+// Whether psi is hardly ever wrong, whatever the print is; what the rig's tolerance makes of it does not count.
+bool has_right_psi(const Scene& scene, const FineFit& fit) {
+  return fit.p_false < scene.max_p_false + limits.tolerance_slack * fit.p_false_by_tolerance;
+}
+
 // Sigma of psi, and the print.
 Status validate_psi(const Scene& scene, const FineFit& fit) {
   const double limit = squared(limits.max_sigma_psi_rad), by_tolerance = fit.psi_variance_by_tolerance;
@@ -64,10 +69,6 @@ Status validate_psi(const Scene& scene, const FineFit& fit) {
 
 bool is_well_seen(const FineFit& fit) {
   return fit.located_fraction() > limits.well_seen_fraction;
-}
-
-bool has_right_psi(const Scene& scene, const FineFit& fit) {
-  return fit.p_false < scene.max_p_false + limits.tolerance_slack * fit.p_false_by_tolerance;
 }
 
 bool tells_psi(const FineFit& fit) {

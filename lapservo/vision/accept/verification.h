@@ -7,8 +7,7 @@
 namespace lapservo::internal {
 
 /// When a fit is good enough to move a robot by. That psi is right, sigma and p_false say; what they can't know is
-/// whether it is the marker that was fitted. Of 17,700 fits to frames of `accuracy_study hostile` these few limits tell
-/// as many wrong ones as a dozen more did.
+/// whether it is the marker that was fitted. How many wrong ones pass: docs/notes/accuracy.md, "False accepts".
 struct ValidationLimits {
   double max_sigma_psi_rad = 0.02;  ///< five sigma: a tenth of a radian, from which on psi counts as wrong
   /// And of psi as it is told, with what one side alone or a turn within the exposure add.
@@ -21,8 +20,8 @@ struct ValidationLimits {
   double min_matching = 0.3;        ///< of the samples on the marker, with their band's colour
   double max_wrong = 0.05;          ///< of them, with another band's
   int min_lines = 6;  ///< on which the inner boundaries are located, and the ends; without the RCM each end
-  double missed_fraction =
-      0.3;  ///< of a boundary's lines in clear view: located on fewer, it is not where it should be
+  /// Of a boundary's lines in clear view: located on fewer, it is not where it should be.
+  double missed_fraction = 0.3;
   /// Wrong fits agree with few boundaries or sides, and badly; blood leaves few, which agree well; compression leaves
   /// many, noisy. So the boundaries' mean square may grow with the located fraction. Of the sides half is enough.
   double max_rms_sigmas = 2.2, enough_of_sides = 0.5;
@@ -39,9 +38,6 @@ ColourAgreement colour_agreement(const Scene& scene, const ShaftPose& pose);
 
 /// Enough of the boundary points are located to blame the print or the registration.
 bool is_well_seen(const FineFit& fit);
-
-/// Whether psi is hardly ever wrong, whatever the print is; what the rig's tolerance makes of it does not count.
-bool has_right_psi(const Scene& scene, const FineFit& fit);
 
 /// Whether sigma of psi, as it is told, is small enough to be of use.
 bool tells_psi(const FineFit& fit);

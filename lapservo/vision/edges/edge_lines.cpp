@@ -484,6 +484,8 @@ namespace lapservo::internal {
 HWY_EXPORT(locate_steps);
 HWY_EXPORT(locate_contours);
 
+namespace {
+
 EdgeProfile sample_profile(const LightImage& light, const EdgeLine& line) {
   EdgeProfile profile;
   profile.first_px = static_cast<float>(-line.before);
@@ -498,6 +500,8 @@ EdgeProfile sample_profile(const LightImage& light, const EdgeLine& line) {
   }
   return profile;
 }
+
+}  // namespace
 
 EdgeFit locate_step(const LightImage& light, const EdgeLine& line, int iterations) {
   return fit_step(sample_profile(light, line), line.blur_px, iterations);

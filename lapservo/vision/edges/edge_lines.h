@@ -1,6 +1,5 @@
 #pragma once
 
-#include <algorithm>
 #include <span>
 
 #include "lapservo/core/inplace_vector.h"
@@ -19,20 +18,10 @@ struct EdgeLine {
   float contour_radius_px = 0;  ///< for locate_contours
 };
 
-/// How far a line across a shaft's side reaches out of it and into it: of so wide a blur and, where the side's place is
-/// not known to a fraction of it, some more.
-inline int outside_of_side_px(double blur_px, double extra_px) {
-  return static_cast<int>(std::min(2.5 * blur_px + extra_px, 14.0));
-}
-inline int inside_of_side_px(double radius_px) {
-  return static_cast<int>(std::min(0.34 * radius_px, 26.0));
-}
-
 inline constexpr std::size_t max_edge_lines = 512;
 using EdgeFits = InplaceVector<EdgeFit, max_edge_lines>;
 
-/// The light along a line; fit_step and fit_contour of it.
-EdgeProfile sample_profile(const LightImage& light, const EdgeLine& line);
+/// fit_step and fit_contour of the light along a line.
 EdgeFit locate_step(const LightImage& light, const EdgeLine& line, int iterations);
 EdgeFit locate_contour(const LightImage& light, const EdgeLine& line, int iterations);
 

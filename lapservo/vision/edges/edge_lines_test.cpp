@@ -1,5 +1,6 @@
 #include "lapservo/vision/edges/edge_lines.h"
 
+#include <algorithm>
 #include <cmath>
 #include <hwy/highway.h>
 #include <hwy/targets.h>

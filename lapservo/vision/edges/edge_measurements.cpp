@@ -402,6 +402,15 @@ struct Side {
         group(sign < 0 ? 4 : 5) {}
 };
 
+// How far a line across a shaft's side reaches out of it and into it: of so wide a blur and, where the side's place is
+// not known to a fraction of it, some more.
+int outside_of_side_px(double blur_px, double extra_px) {
+  return static_cast<int>(std::min(2.5 * blur_px + extra_px, 14.0));
+}
+int inside_of_side_px(double radius_px) {
+  return static_cast<int>(std::min(0.34 * radius_px, 26.0));
+}
+
 // A point of a side where it is expected.
 struct SidePlace {
   Measurement measurement;

@@ -25,11 +25,6 @@ Found refusal(Status status, const PoseUnknowns& unknowns) {
   return {status, std::nullopt, finite ? std::optional(pose) : std::nullopt};
 }
 
-// A print that is off would contradict any registration.
-bool contradicts_registration(const Scene& scene, const FineFit& free) {
-  return is_well_seen(free) && has_right_psi(scene, free);
-}
-
 // What the model leaves out of one side, the other one doesn't balance: error / sigma was 1.7 on 80 renderings.
 Found with_doubt_of_one_side(const Scene& scene, FineFit fit) {
   constexpr double doubt = 1.5;
@@ -53,9 +48,8 @@ FineFit fitted(const Scene& scene, const LightImage& light, const PoseUnknowns& 
   return fit;
 }
 
-// A fit that is ok. One side alone holds the place of a shaft that is cut along, and
-// where the robust loss takes that for an outlier at first, fits stop short of it by 20 mrad, six sigma: they go on
-// until psi rests and the side agrees.
+// A fit that is ok. One side alone holds the place of a shaft that is cut along, and where the robust loss takes that
+// for an outlier at first, fits stop short of it by 20 mrad, six sigma: they go on until psi rests and the side agrees.
 Found accepted(const Scene& scene, const LightImage& light, FineFit fit, const ExpectedProcessing& processing,
                WorkBudget& budget) {
   if (!cut_along(scene, fit.unknowns.pose())) return {Status::ok, std::move(fit), {}};
@@ -247,10 +241,11 @@ Found MarkerSearch::look_without_rcm(const SearchFrame& frame, WorkBudget& budge
   return found;
 }
 
-// What shows plainly, but elsewhere than the RCM allows.
+// What shows plainly, but elsewhere than the RCM allows. That psi holds whatever the print is, validate() has asked: a
+// print that is off would contradict any registration.
 Found MarkerSearch::despite_registration(const SearchFrame& frame, bool plain_is_known, WorkBudget& budget) {
   Found free = detect(frame, std::nullopt, free_, budget);
-  if (!free.fit || !contradicts_registration(frame.scene, *free.fit)) return {};
+  if (!free.fit || !is_well_seen(*free.fit)) return {};
   if (plain_is_known) return free;
   // In this frame a fit through the RCM may be possible where none was before.
   Walk again;
