@@ -6,6 +6,7 @@
 
 #include <Eigen/Cholesky>
 #include <gtest/gtest.h>
+#include <opencv2/imgproc.hpp>
 
 #include "lapservo/core/angles.h"
 #include "lapservo/kinematics/centre_line.h"
@@ -169,6 +170,11 @@ TEST(Observation, IsFiniteForEveryStatus) {
     below(cv::Rect(0, covered / 2, size.width, size.height - covered / 2)) = cv::Scalar(30, 30, 120);
     images.insert(images.end(), {left, right, below});
   }
+  for (const double sigma_px : {3.0, 6.0}) {
+    cv::Mat blurred;
+    cv::GaussianBlur(usual, blurred, {}, sigma_px);
+    images.push_back(blurred);
+  }
   // Bands without a shaft: flat stripes of the colours.
   cv::Mat stripes = cv::Mat::zeros(size, CV_8UC3);
   stripes(cv::Rect(200, 200, 60, 80)) = cv::Scalar(20, 200, 110);
@@ -187,7 +193,7 @@ TEST(Observation, IsFiniteForEveryStatus) {
       }
     }
   }
-  EXPECT_GE(seen.size(), 4U);
+  EXPECT_GE(seen.size(), 5U);
 }
 
 }  // namespace

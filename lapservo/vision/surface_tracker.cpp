@@ -100,13 +100,6 @@ void SurfaceTracker::cover_found(std::size_t i, const std::vector<Blob>& blobs, 
   }
 }
 
-bool SurfaceTracker::may_touch_another_lost(std::size_t i) const {
-  if (!rig_.instruments[i].camera_from_rcm) return false;
-  for (std::size_t j = 0; j < rig_.instruments.size(); ++j)
-    if (j != i && !found_[j].fit && rig_.instruments[j].camera_from_rcm) return true;
-  return false;
-}
-
 // What others hide of it matters only where it can't be followed without, or could not last time.
 Found SurfaceTracker::follow_known(const ImageView& image, const LightImage& light, std::size_t i, WorkBudget& budget) {
   const InstrumentMemory& memory = *memory_[i];
@@ -130,13 +123,11 @@ Found SurfaceTracker::follow_known(const ImageView& image, const LightImage& lig
 
 Found SurfaceTracker::look_for(const ImageView& image, const LightImage& light, const std::vector<Blob>& blobs,
                                std::size_t i, WorkBudget& budget) {
-  const std::vector<Blob> none;
-  if (others_.empty()) {
-    const std::vector<Blob>& shared = may_touch_another_lost(i) ? blobs : none;
-    return searches_[i].look({scene_of(image, i), light, blobs, rig_.instruments[i].camera_from_rcm, shared}, budget);
-  }
-  const std::vector<Blob> left = without(blobs, others_);
-  Found found = searches_[i].look({scene_of(image, i), light, left, rig_.instruments[i].camera_from_rcm, left}, budget);
+  const auto look = [&](const std::vector<Blob>& where) {
+    return searches_[i].look({scene_of(image, i), light, where, rig_.instruments[i].camera_from_rcm}, budget);
+  };
+  if (others_.empty()) return look(blobs);
+  Found found = look(without(blobs, others_));
   found.among_others = found.fit.has_value();
   return found;
 }

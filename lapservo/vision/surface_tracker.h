@@ -45,7 +45,6 @@ class SurfaceTracker {
                  std::size_t instrument, WorkBudget& budget);
   bool cover_expected(std::size_t instrument, WorkBudget& budget);
   void cover_found(std::size_t instrument, const std::vector<Blob>& blobs, WorkBudget& budget);
-  bool may_touch_another_lost(std::size_t instrument) const;
   void cover(std::size_t instrument, const ShaftPose& pose, WorkBudget& budget);
   void learn_print(std::size_t instrument);
   Scene scene_of(const ImageView& image, std::size_t instrument) const;

@@ -256,24 +256,21 @@ RotationSearch search_rotation(const Scene& scene, const SampledSurface& surface
 
 }  // namespace
 
-CoarseFit fit_coarsely(const Scene& scene, PoseUnknowns start, const CoarseFitOptions& options) {
+CoarseFit fit_coarsely(const Scene& scene, PoseUnknowns start, Rotation rotation) {
   constexpr int steps_per_round = 4;
   CoarseFit fit;
   fit.unknowns = std::move(start);
-  bool rotation_known = !options.search_rotation;
-  for (int round = 0; round < options.rounds; ++round) {
+  bool rotation_known = rotation == Rotation::known;
+  const int rounds = rotation_known ? 1 : 2;
+  for (int round = 0; round < rounds; ++round) {
     const auto view = view_cylinder(fit.unknowns.pose().camera_from_unrolled, scene.marker.radius_m());
     if (!view) return fit;
     const double narrowing = round == 0 ? 1 : 0.5;
-    const auto sides =
-        measure_sides(scene, fit.unknowns.pose(), *view, std::max(8.0, options.lateral_reach_px * narrowing));
-    const auto surface =
-        sample_surface(scene, fit.unknowns.pose(), *view, std::max(0.12, options.along_reach * narrowing));
+    const auto sides = measure_sides(scene, fit.unknowns.pose(), *view, narrowing * coarse_fit_limits.lateral_reach_px);
+    const auto surface = sample_surface(scene, fit.unknowns.pose(), *view, narrowing * coarse_fit_limits.along_reach);
     const auto boundaries = measure_boundaries(scene, fit.unknowns.pose(), surface);
-    fit.boundaries_seen = static_cast<int>(boundaries.size());
-    if (fit.boundaries_seen < coarse_fit_limits.min_boundaries || sides.size() < coarse_fit_limits.min_sides)
-      return fit;
-    if (options.search_rotation && round == 1) {
+    if (boundaries.size() < coarse_fit_limits.min_boundaries || sides.size() < coarse_fit_limits.min_sides) return fit;
+    if (!rotation_known && round == 1) {
       const RotationSearch search = search_rotation(scene, surface);
       fit.unknowns = fit.unknowns.with_psi(search.psi_rad);
       fit.rotation_score = search.score;

@@ -9,6 +9,7 @@
 #include "lapservo/kinematics/centre_line.h"
 #include "lapservo/testing/scenes.h"
 #include "lapservo/vision/search/initial_pose.h"
+#include "lapservo/vision/search/rcm_starts.h"
 
 namespace lapservo::internal {
 namespace {
@@ -46,7 +47,8 @@ TEST(CoarseFit, AlignsAPoseToAboutAPixelWhateverItsRotation) {
       const Shot& shot = usual_shot(seed);
       Random random(seed + 50);
       const PoseUnknowns truth = shot.truth(rcm);
-      const CoarseFit fit = fit_coarsely(shot.sight.scene(), truth.changed_by(large_offset(random, truth.size())), {});
+      const CoarseFit fit =
+          fit_coarsely(shot.sight.scene(), truth.changed_by(large_offset(random, truth.size())), Rotation::unknown);
       ASSERT_TRUE(fit.found);
       EXPECT_LT(miss_px(shot, fit.unknowns.pose()), 2.5);
       EXPECT_LT(std::abs(wrap_pi(fit.unknowns.pose().psi_rad - shot.q.psi_rad)), 0.1);
@@ -61,10 +63,7 @@ TEST(CoarseFit, KeepsAGivenRotationWhenNotAskedToSearch) {
     const Shot& shot = usual_shot(seed);
     UnknownVector offset(4);
     offset << 0.004, -0.003, 1e-3, 0.05;
-    CoarseFitOptions options;
-    options.search_rotation = false;
-    options.rounds = 1;
-    const CoarseFit fit = fit_coarsely(shot.sight.scene(), shot.truth(true).changed_by(offset), options);
+    const CoarseFit fit = fit_coarsely(shot.sight.scene(), shot.truth(true).changed_by(offset), Rotation::known);
     ASSERT_TRUE(fit.found);
     EXPECT_LT(miss_px(shot, fit.unknowns.pose()), 3);
     EXPECT_EQ(fit.rotation_score, 0);
@@ -74,10 +73,10 @@ TEST(CoarseFit, KeepsAGivenRotationWhenNotAskedToSearch) {
 TEST(CoarseFit, FindsNothingInTissueNorFarFromTheMarker) {
   const Shot& shot = usual_shot(2);
   const Sight empty(shot.rig, scenes::render_nothing(shot.rig, 3));
-  EXPECT_FALSE(fit_coarsely(empty.scene(), shot.truth(true), {}).found);
+  EXPECT_FALSE(fit_coarsely(empty.scene(), shot.truth(true), Rotation::unknown).found);
   UnknownVector offset = UnknownVector::Zero(6);
   offset[1] = 1.5;
-  EXPECT_FALSE(fit_coarsely(shot.sight.scene(), shot.truth(false).changed_by(offset), {}).found);
+  EXPECT_FALSE(fit_coarsely(shot.sight.scene(), shot.truth(false).changed_by(offset), Rotation::unknown).found);
 }
 
 // Another instrument's bands leave some of the boundaries, but no rotation explains the colours.
@@ -87,7 +86,7 @@ TEST(CoarseFit, AnotherOrderOfTheColoursAgreesWithNoRotation) {
     Rig other = shot.rig;
     other.instruments[0].marker.hues_deg = {180, 270, 90};
     const Sight sight(other, shot.bgr);
-    const CoarseFit fit = fit_coarsely(sight.scene(), shot.truth(true), {});
+    const CoarseFit fit = fit_coarsely(sight.scene(), shot.truth(true), Rotation::unknown);
     EXPECT_TRUE(!fit.found || fit.rotation_score < 0.3) << "seed " << seed;
   }
 }
@@ -99,8 +98,9 @@ TEST(InitialPoses, LieNearTheTruth) {
       const Shot& shot = usual_shot(seed);
       const auto blobs = find_blobs(shot.sight.view(), shot.sight.classes(), 8, 8);
       ASSERT_FALSE(blobs.empty());
-      const auto camera_from_rcm = rcm ? shot.rig.instruments[0].camera_from_rcm : std::nullopt;
-      const auto poses = initial_poses(shot.sight.scene(), blobs[0], camera_from_rcm).poses;
+      const auto poses =
+          rcm ? starts_through_rcm(shot.sight.scene(), blobs[0], *shot.rig.instruments[0].camera_from_rcm)
+              : initial_poses(shot.sight.scene(), blobs[0]).poses;
       ASSERT_FALSE(poses.empty());
       double nearest_px = 1e9;
       for (const PoseUnknowns& unknowns : poses) {
@@ -124,8 +124,8 @@ TEST(InitialPoses, AreNoneForABlobWithoutTheMarkersColoursInTheirOrder) {
   Blob blob;  // of one colour only
   blob.grid_px = 8;
   for (int i = 0; i < 30; ++i) blob.samples.push_back({300 + 8 * (i % 6), 200 + 8 * (i / 6), 1});
-  EXPECT_TRUE(initial_poses(shot.sight.scene(), blob, std::nullopt).poses.empty());
-  EXPECT_TRUE(initial_poses(shot.sight.scene(), Blob{}, std::nullopt).poses.empty());
+  EXPECT_TRUE(initial_poses(shot.sight.scene(), blob).poses.empty());
+  EXPECT_TRUE(initial_poses(shot.sight.scene(), Blob{}).poses.empty());
 }
 
 }  // namespace

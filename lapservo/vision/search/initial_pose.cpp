@@ -9,7 +9,6 @@
 
 #include "lapservo/core/statistics.h"
 #include "lapservo/geometry/rotation.h"
-#include "lapservo/kinematics/centre_line.h"
 #include "lapservo/marker/band_shares.h"
 #include "lapservo/vision/search/coarse_fit.h"
 #include "lapservo/vision/search/heaviest_stretch.h"
@@ -35,8 +34,6 @@ struct Outline {
   ImageFrame frame;
   SideLine low, high;      // the sides, low.at(x) < high.at(x)
   double first_x, last_x;  // extent of the blob
-  // Where one side alone lies in the image, the other one's line is where the image ends: low's or high's sign.
-  double only_side = 0;
 };
 
 struct BlobShape {
@@ -110,10 +107,9 @@ SideLine fit_side(const std::vector<Eigen::Vector2d>& points, double outwards) {
   return line;
 }
 
-// Where the marker's colours begin and end on a section at x, and whether that is where the image does.
+// Where the marker's colours begin and end on a section at x; nullopt where few are, or the image ends beside them.
 struct Section {
   double low, high;
-  bool low_outside, high_outside;
 };
 std::optional<Section> section_at(const Scene& scene, const ImageFrame& frame, double x, double reach_px,
                                   double step_px) {
@@ -122,9 +118,10 @@ std::optional<Section> section_at(const Scene& scene, const ImageFrame& frame, d
   const Stretch<double> coloured =
       heaviest_stretch(-reach, reach + 1, [&](int i) { return scene.is_ours(colour_at(i)) ? 1 : -0.8; });
   if (coloured.sum * step_px < 4) return std::nullopt;
+  if (colour_at(coloured.first - 1) == Scene::outside || colour_at(coloured.last + 1) == Scene::outside)
+    return std::nullopt;
   return Section{(coloured.first - 0.5) * step_px - coarse_fit_limits.contour_inset_px,
-                 (coloured.last + 0.5) * step_px + coarse_fit_limits.contour_inset_px,
-                 colour_at(coloured.first - 1) == Scene::outside, colour_at(coloured.last + 1) == Scene::outside};
+                 (coloured.last + 0.5) * step_px + coarse_fit_limits.contour_inset_px};
 }
 
 // Points on the sides, in the outline's frame.
@@ -132,8 +129,8 @@ struct OutlineSides {
   std::vector<Eigen::Vector2d> low, high;
 };
 
-// The blob's extent along the shaft, and sections across it: of the shaft as wide as it is, or where that gives too
-// few, with what the image's border leaves of it. Round 0 and 1 only turn and shift the frame.
+// The blob's extent along the shaft, and sections across it, as wide as it is. Round 0 and 1 only turn and shift the
+// frame.
 std::optional<OutlineSides> find_sides(const Scene& scene, const BlobShape& shape, Outline& outline, bool last_round) {
   constexpr int sections = 13;
   constexpr std::size_t enough = 4;
@@ -147,23 +144,14 @@ std::optional<OutlineSides> find_sides(const Scene& scene, const BlobShape& shap
   }
   const double reach_px = widest * 1.3 + 12, finest_px = std::max(1.0, reach_px / 150);
   const double step_px = last_round ? finest_px : std::max(finest_px, reach_px / 40);
-  OutlineSides whole, cut;
-  int low_cut = 0, high_cut = 0;
+  OutlineSides sides;
   for (int i = 0; i < sections; ++i) {
     const double x = outline.first_x + (outline.last_x - outline.first_x) * (i + 0.5) / sections;
     const auto section = section_at(scene, outline.frame, x, reach_px, step_px);
-    if (!section || (section->low_outside && section->high_outside)) continue;
-    cut.low.emplace_back(x, section->low), cut.high.emplace_back(x, section->high);
-    low_cut += section->low_outside, high_cut += section->high_outside;
-    if (section->low_outside || section->high_outside) continue;
-    whole.low.emplace_back(x, section->low), whole.high.emplace_back(x, section->high);
+    if (!section) continue;
+    sides.low.emplace_back(x, section->low), sides.high.emplace_back(x, section->high);
   }
-  outline.only_side = 0;
-  if (whole.low.size() >= enough) return whole;
-  // The same side everywhere.
-  if (cut.low.size() < enough || (low_cut > 0) == (high_cut > 0)) return std::nullopt;
-  outline.only_side = low_cut > 0 ? 1 : -1;
-  return cut;
+  return sides.low.size() >= enough ? std::optional(sides) : std::nullopt;
 }
 
 std::optional<Outline> find_outline(const Scene& scene, const BlobShape& shape, Eigen::Vector2d along) {
@@ -175,9 +163,7 @@ std::optional<Outline> find_outline(const Scene& scene, const BlobShape& shape, 
     if (!sides) return std::nullopt;
     outline.low = fit_side(sides->low, -1), outline.high = fit_side(sides->high, 1);
     if (round + 1 == rounds) break;
-    const double slope = outline.only_side < 0   ? outline.low.slope
-                         : outline.only_side > 0 ? outline.high.slope
-                                                 : (outline.low.slope + outline.high.slope) / 2;
+    const double slope = (outline.low.slope + outline.high.slope) / 2;
     const double turn = std::atan(slope), shift = (outline.low.at(0) + outline.high.at(0)) / 2;
     outline.frame.origin += shift * outline.frame.across();
     outline.frame.along = (std::cos(turn) * outline.frame.along + std::sin(turn) * outline.frame.across()).normalized();
@@ -241,89 +227,18 @@ Rigid3 frame_along(const Eigen::Vector3d& origin, const Eigen::Vector3d& axis) {
   return {rotation_between(Eigen::Vector3d::UnitZ(), axis), origin};
 }
 
-// Depth of the proximal end at which a shaft through the RCM shows its distal end where it is seen.
-double depth_from_length(const Scene& scene, const Rigid3& camera_from_rcm, const Eigen::Vector3d& proximal_end,
-                         const Eigen::Vector2d& distal_ideal_px) {
-  constexpr int steps = 60;
-  double best_m = proximal_end.z(), best_miss_px = 1e9;
-  for (int i = 0; i <= steps; ++i) {
-    const double depth_m = proximal_end.z() * std::exp(0.6 * (2.0 * i / steps - 1));
-    const Eigen::Vector3d proximal = proximal_end * (depth_m / proximal_end.z());
-    const Eigen::Vector3d axis = (proximal - camera_from_rcm.translation).normalized();
-    const Eigen::Vector3d distal = proximal + scene.marker.length_m() * axis;
-    if (!(distal.z() > 1e-3)) continue;
-    const double miss_px = (scene.camera.ideal_from_point(distal) - distal_ideal_px).norm();
-    if (miss_px < best_miss_px) best_miss_px = miss_px, best_m = depth_m;
-  }
-  return best_m;
-}
-
-// Of a shaft of which one side shows: points of the axis whose side is seen at x, as the shaft is nearer or farther.
-class AxisBesideContour {
- public:
-  AxisBesideContour(const Scene& scene, const Outline& outline, double x) : radius_m_(scene.marker.radius_m()) {
-    const SideLine& side = outline.only_side < 0 ? outline.low : outline.high;
-    const auto ray = [&](double y) { return scene.camera.ray_from_ideal(outline.frame.at(x, y)).normalized(); };
-    contour_ = ray(side.at(x));
-    inwards_ = ray(side.at(x) - outline.only_side) - contour_;
-    inwards_ = (inwards_ - inwards_.dot(contour_) * contour_).normalized();
-  }
-  Eigen::Vector3d at(double distance_m) const {
-    const double sine = std::min(0.9, radius_m_ / distance_m);
-    return distance_m * (std::sqrt(1 - sine * sine) * contour_ + sine * inwards_);
-  }
-
- private:
-  double radius_m_;
-  Eigen::Vector3d contour_, inwards_;
-};
-
-// The proximal end, by one side, both ends of the colours and the RCM: at the depth at which the marker is as long as
-// it looks.
-std::optional<Eigen::Vector3d> proximal_end_beside_contour(const Scene& scene, const Outline& outline, const Ends& ends,
-                                                           const Rigid3& camera_from_rcm) {
-  if (!ends.first_x || !ends.last_x) return std::nullopt;
-  const AxisBesideContour proximal(scene, outline, *ends.first_x), distal(scene, outline, *ends.last_x);
-  constexpr int steps = 120;
-  constexpr double nearest_m = 0.03, farthest_m = 0.4;
-  double least_miss_px = 1e9;
-  std::optional<Eigen::Vector3d> best;
-  for (int i = 0; i <= steps; ++i) {
-    const Eigen::Vector3d start = proximal.at(nearest_m * std::pow(farthest_m / nearest_m, 1.0 * i / steps));
-    const Eigen::Vector3d axis = (start - camera_from_rcm.translation).normalized();
-    const Eigen::Vector3d end = start + scene.marker.length_m() * axis;
-    if (!(start.z() > 1e-3) || !(end.z() > 1e-3)) continue;
-    const Eigen::Vector3d seen = distal.at(end.norm());
-    if (!(seen.z() > 1e-3)) continue;
-    const double miss_px = (scene.camera.ideal_from_point(end) - scene.camera.ideal_from_point(seen)).norm();
-    if (miss_px < least_miss_px) least_miss_px = miss_px, best = start;
-  }
-  return best;
-}
-
 }  // namespace
 
-InitialPoses initial_poses(const Scene& scene, const Blob& blob, const std::optional<Rigid3>& camera_from_rcm) {
+InitialPoses initial_poses(const Scene& scene, const Blob& blob) {
   const auto shape = shape_of(scene, blob);
   if (!shape) return {};
-  Eigen::Vector2d line = shape->main_direction;
-  if (camera_from_rcm)
-    if (const auto rcm_px = projected_rcm_px(scene.camera, *camera_from_rcm))
-      if ((shape->centre - *rcm_px).norm() > 50) line = (shape->centre - *rcm_px).normalized();
-  const auto along = directed(*shape, line);
+  const auto along = directed(*shape, shape->main_direction);
   if (!along) return {};
   const auto outline = find_outline(scene, *shape, *along);
   if (!outline) return {};
   const Ends ends = find_ends(scene, *outline);
   InitialPoses initial{{}, ends.other_bands};
   std::vector<PoseUnknowns>& poses = initial.poses;
-  if (outline->only_side != 0) {
-    if (!camera_from_rcm) return initial;
-    const auto end = proximal_end_beside_contour(scene, *outline, ends, *camera_from_rcm);
-    const auto q = end ? configuration_through(*camera_from_rcm, *end) : std::nullopt;
-    if (q) poses.push_back(PoseUnknowns::rcm(*camera_from_rcm, *q));
-    return initial;
-  }
   const double middle_x = (outline->first_x + outline->last_x) / 2;
   const auto middle = axis_point(scene, *outline, middle_x);
   if (!middle) return initial;
@@ -338,19 +253,6 @@ InitialPoses initial_poses(const Scene& scene, const Blob& blob, const std::opti
     if (ends.last_x) return at_depth(*ends.last_x, z_m) - length_m * image_axis;
     return at_depth(outline->first_x, z_m);
   };
-  const auto add_through_rcm = [&](const Eigen::Vector3d& proximal_end) {
-    if (const auto q = configuration_through(*camera_from_rcm, proximal_end))
-      poses.push_back(PoseUnknowns::rcm(*camera_from_rcm, *q));
-  };
-  if (camera_from_rcm) {
-    if (ends.first_x && ends.last_x) {
-      const double z_m =
-          depth_from_length(scene, *camera_from_rcm, proximal_at(depth_m), outline->frame.at(*ends.last_x, 0));
-      add_through_rcm(proximal_at(z_m));
-    }
-    add_through_rcm(proximal_at(depth_m));
-    return initial;
-  }
   double tilt = 0;
   if (ends.first_x && ends.last_x)
     tilt = std::acos(

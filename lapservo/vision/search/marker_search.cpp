@@ -5,11 +5,11 @@
 #include <utility>
 
 #include "lapservo/core/angles.h"
+#include "lapservo/vision/accept/displaced_boundary.h"
 #include "lapservo/vision/accept/verification.h"
 #include "lapservo/vision/search/coarse_fit.h"
 #include "lapservo/vision/search/initial_pose.h"
 #include "lapservo/vision/search/rcm_starts.h"
-#include "lapservo/vision/shaft/cut_shaft.h"
 
 namespace lapservo::internal {
 namespace {
@@ -25,17 +25,8 @@ Found refusal(Status status, const PoseUnknowns& unknowns) {
   return {status, std::nullopt, finite ? std::optional(pose) : std::nullopt};
 }
 
-// What the model leaves out of one side, the other one doesn't balance: error / sigma was 1.7 on 80 renderings.
-Found with_doubt_of_one_side(const Scene& scene, FineFit fit) {
-  constexpr double doubt = 1.5;
-  const Status status = validate(scene, fit);
-  fit.covariance *= doubt * doubt;
-  return status == Status::ok ? Found{status, std::move(fit), {}} : refusal(status, fit.unknowns);
-}
-
-CoarseFit fitted_coarsely(const Scene& scene, const PoseUnknowns& start, const CoarseFitOptions& options,
-                          WorkBudget& budget) {
-  const CoarseFit fit = fit_coarsely(scene, start, options);
+CoarseFit fitted_coarsely(const Scene& scene, const PoseUnknowns& start, Rotation rotation, WorkBudget& budget) {
+  const CoarseFit fit = fit_coarsely(scene, start, rotation);
   budget.spend(fit.found ? costs.coarse_fit : costs.no_coarse_fit);
   return fit;
 }
@@ -48,38 +39,21 @@ FineFit fitted(const Scene& scene, const LightImage& light, const PoseUnknowns& 
   return fit;
 }
 
-// A fit that is ok. One side alone holds the place of a shaft that is cut along, and where the robust loss takes that
-// for an outlier at first, fits stop short of it by 20 mrad, six sigma: they go on until psi rests and the side agrees.
-Found accepted(const Scene& scene, const LightImage& light, FineFit fit, const ExpectedProcessing& processing,
-               WorkBudget& budget) {
-  if (!cut_along(scene, fit.unknowns.pose())) return {Status::ok, std::move(fit), {}};
-  constexpr int most = 4;
-  constexpr double rest_sigmas = 0.2, least_sides = 0.8;
-  for (int i = 0; i < most; ++i) {
-    const double before_rad = fit.unknowns.pose().psi_rad;
-    fit = fitted(scene, light, fit.unknowns, fit.blur, {processing.ask, fit.bias_px, fit.departure}, budget);
-    if (const Status status = validate(scene, fit); status != Status::ok) return refusal(status, fit.unknowns);
-    const double moved_rad = std::abs(wrap_pi(fit.unknowns.pose().psi_rad - before_rad));
-    if (moved_rad < rest_sigmas * std::sqrt(fit.psi_variance_rad2()) &&
-        fit.sides_used >= least_sides * fit.sides_in_image)
-      return with_doubt_of_one_side(scene, fit);
+// What a fit comes to: it is ok, unless it is refused or a boundary shows elsewhere.
+Found judged(const Scene& scene, const LightImage& light, FineFit fit, WorkBudget& budget) {
+  Status status = validate(scene, fit);
+  if (status == Status::ok && may_be_displaced(fit)) {
+    budget.spend(costs.fine_pass);
+    if (is_displaced(scene, light, fit)) status = Status::marker_mismatch;
   }
-  return refusal(Status::uncertain, fit.unknowns);
+  return status == Status::ok ? Found{status, std::move(fit), {}} : refusal(status, fit.unknowns);
 }
 
 Found try_start(const Scene& scene, const LightImage& light, const PoseUnknowns& start, WorkBudget& budget) {
-  const CoarseFit coarse = fitted_coarsely(scene, start, {}, budget);
+  const CoarseFit coarse = fitted_coarsely(scene, start, Rotation::unknown, budget);
   if (!coarse.shows_rotation()) return {};
   if (coarse.has_rival()) return refusal(Status::ambiguous, coarse.unknowns);
-  const FineFit first = fitted(scene, light, coarse.unknowns, {}, {}, budget);
-  const Status validated = validate(scene, first);
-  if (validated == Status::ok) return accepted(scene, light, first, {}, budget);
-  if (validated == Status::marker_mismatch) return refusal(validated, first.unknowns);
-  const CoarseFit nearer = fitted_coarsely(scene, coarse.unknowns, near_by, budget);
-  if (!nearer.found) return {};
-  const FineFit fit = fitted(scene, light, nearer.unknowns, {}, {}, budget);
-  const Status status = validate(scene, fit);
-  return status == Status::ok ? accepted(scene, light, fit, {}, budget) : refusal(status, fit.unknowns);
+  return judged(scene, light, fitted(scene, light, coarse.unknowns, {}, {}, budget), budget);
 }
 
 // Two fits of one marker that are both ok: of what blood leaves both can't be sure.
@@ -95,30 +69,26 @@ double reach_px(const SearchFrame& frame) {
   return of_width * frame.scene.image.width_px;
 }
 
-InitialPoses starts_in(const SearchFrame& frame, const Blob& blob, const std::optional<Rigid3>& camera_from_rcm,
-                       WorkBudget& budget) {
-  InitialPoses starts = initial_poses(frame.scene, blob, camera_from_rcm);
-  budget.spend(starts.poses.empty() ? costs.no_initial_poses : costs.initial_poses);
+InitialPoses starts_in(const SearchFrame& frame, bool through_rcm, const Blob& blob, WorkBudget& budget) {
+  InitialPoses starts;
+  if (through_rcm)
+    starts.poses = starts_through_rcm(frame.scene, blob, *frame.camera_from_rcm);
+  else
+    starts = initial_poses(frame.scene, blob);
+  budget.spend(starts.poses.empty() ? costs.no_starts : costs.starts_in_blob(!frame.scene.others.empty()));
   return starts;
-}
-
-std::vector<PoseUnknowns> rcm_starts_in(const SearchFrame& frame, const Blob& blob, WorkBudget& budget) {
-  budget.spend(costs.starts_through_rcm(!frame.scene.others.empty()));
-  return starts_through_rcm(frame.scene, blob, *frame.camera_from_rcm);
 }
 
 }  // namespace
 
 Found follow(const Scene& scene, const LightImage& light, const PoseUnknowns& expected, const EdgeBlur& blur,
              const ExpectedProcessing& processing, WorkBudget& budget) {
-  const FineFit near = fitted(scene, light, expected, blur, processing, budget);
-  const Status nearby = validate(scene, near);
-  if (nearby == Status::ok) return accepted(scene, light, near, processing, budget);
-  const CoarseFit coarse = fitted_coarsely(scene, expected, from_memory, budget);
-  if (!coarse.found) return {};
-  const FineFit fit = fitted(scene, light, coarse.unknowns, blur, processing, budget);
-  const Status status = validate(scene, fit);
-  return status == Status::ok ? accepted(scene, light, fit, processing, budget) : refusal(status, fit.unknowns);
+  const auto fitted_from = [&](const PoseUnknowns& start) {
+    return judged(scene, light, fitted(scene, light, start, blur, processing, budget), budget);
+  };
+  if (Found near = fitted_from(expected); near.fit) return near;
+  const CoarseFit coarse = fitted_coarsely(scene, expected, Rotation::known, budget);
+  return coarse.found ? fitted_from(coarse.unknowns) : Found{};
 }
 
 Found follow_through_rcm(const Scene& scene, const LightImage& light, const FineFit& free,
@@ -133,18 +103,23 @@ Found follow_through_rcm(const Scene& scene, const LightImage& light, const Fine
   const Eigen::Vector2d tilt_rad = z.cross(axis).head<2>();  // the first two unknowns of a free pose
   if (!(tilt_rad.dot(free.covariance.topLeftCorner<2, 2>().inverse() * tilt_rad) < most_sigmas * most_sigmas))
     return {};
-  const FineFit fit = fitted(scene, light, start, free.blur, {false, free.bias_px, free.departure}, budget);
-  return validate(scene, fit) == Status::ok ? accepted(scene, light, fit, {}, budget) : Found{};
+  return judged(scene, light, fitted(scene, light, start, free.blur, {false, free.bias_px, free.departure}, budget),
+                budget);
 }
 
 // The starts of one blob, until one fits. Without the RCM they are rivals: all are tried then, in one frame.
-Found MarkerSearch::detect_in_blob(const SearchFrame& frame, const std::optional<Rigid3>& camera_from_rcm,
-                                   const Blob& blob, Walk& walk, WorkBudget& budget) {
+Found MarkerSearch::detect_in_blob(const SearchFrame& frame, bool through_rcm, const Blob& blob, Walk& walk,
+                                   WorkBudget& budget) {
   Found best;
-  const auto [starts, other_bands] = starts_in(frame, blob, camera_from_rcm, budget);
+  const std::size_t first = walk.blobs.start();
+  if (!budget.allows(costs.starts_in_blob(!frame.scene.others.empty()) + costs.try_start())) {
+    walk.blobs.stop(blob, first);
+    return best;
+  }
+  const auto [starts, other_bands] = starts_in(frame, through_rcm, blob, budget);
   walk.other_bands |= other_bands;
-  for (std::size_t i = walk.blobs.start(); i < starts.size(); ++i) {
-    if ((camera_from_rcm || i == 0) && !budget.allows(costs.try_start())) {
+  for (std::size_t i = first; i < starts.size(); ++i) {
+    if (through_rcm && i > first && !budget.allows(costs.try_start())) {
       walk.blobs.stop(blob, i);
       return best;
     }
@@ -156,17 +131,16 @@ Found MarkerSearch::detect_in_blob(const SearchFrame& frame, const std::optional
       continue;
     }
     if (!best.fit || found.fit->misfit() < best.fit->misfit()) best = std::move(found);
-    if (camera_from_rcm) break;  // the starts are ways to one solution
+    if (through_rcm) break;
   }
   walk.blobs.finish(blob);
   return best;
 }
 
-Found MarkerSearch::detect(const SearchFrame& frame, const std::optional<Rigid3>& camera_from_rcm, Walk& walk,
-                           WorkBudget& budget) {
+Found MarkerSearch::detect(const SearchFrame& frame, bool through_rcm, Walk& walk, WorkBudget& budget) {
   Found best;
   for (const Blob* blob : walk.blobs.rest(frame.blobs, reach_px(frame))) {
-    Found found = detect_in_blob(frame, camera_from_rcm, *blob, walk, budget);
+    Found found = detect_in_blob(frame, through_rcm, *blob, walk, budget);
     if (found.fit || found.status == Status::marker_mismatch) {
       walk.done = true;
       return found;
@@ -189,7 +163,7 @@ MarkerSearch::Rival MarkerSearch::look_for_rival(const SearchFrame& frame, const
   const double apart_px = rival_apart_radii * scene.marker.radius_m() /
                           fit.unknowns.pose().camera_from_unrolled.translation.norm() * scene.camera.fx_px;
   for (const Blob& blob : frame.blobs)
-    for (const PoseUnknowns& start : starts_in(frame, blob, std::nullopt, budget).poses) {
+    for (const PoseUnknowns& start : starts_in(frame, false, blob, budget).poses) {
       if ((middle(start) - middle(fit.unknowns)).norm() < apart_px) continue;
       if (!budget.allows(costs.try_start())) return Rival::not_known_yet;
       const Found other = try_start(scene, frame.light, start, budget);
@@ -211,7 +185,6 @@ bool MarkerSearch::lost_candidate(const SearchFrame& frame, WorkBudget& budget) 
 // While the look goes on, `plain` is what the last whole one came to.
 void MarkerSearch::know(Found& plain) {
   if (plain.status != Status::no_marker || plain_.done) status_ = plain.status;
-  if (plain_.done) other_bands_ = plain_.other_bands;
   plain.status = status_;
 }
 
@@ -226,9 +199,9 @@ Found MarkerSearch::look_without_rcm(const SearchFrame& frame, WorkBudget& budge
   const bool waited = candidate_.has_value();
   if (waited && lost_candidate(frame, budget)) begin_anew(status_);
   if (!candidate_) {
-    Found plain = detect(frame, std::nullopt, plain_, budget);
+    Found plain = detect(frame, false, plain_, budget);
     know(plain);
-    if (plain_.done) plain_ = {};
+    if (plain_.done) other_bands_ = plain_.other_bands, plain_ = {};
     if (!plain.fit) return plain;
     candidate_ = plain.fit;
   }
@@ -244,13 +217,13 @@ Found MarkerSearch::look_without_rcm(const SearchFrame& frame, WorkBudget& budge
 // What shows plainly, but elsewhere than the RCM allows. That psi holds whatever the print is, validate() has asked: a
 // print that is off would contradict any registration.
 Found MarkerSearch::despite_registration(const SearchFrame& frame, bool plain_is_known, WorkBudget& budget) {
-  Found free = detect(frame, std::nullopt, free_, budget);
+  Found free = detect(frame, false, free_, budget);
   if (!free.fit || !is_well_seen(*free.fit)) return {};
   if (plain_is_known) return free;
   // In this frame a fit through the RCM may be possible where none was before.
   Walk again;
   budget.allow(WorkBudget::Beyond::all);
-  Found through_rcm = detect(frame, frame.camera_from_rcm, again, budget);
+  Found through_rcm = detect(frame, true, again, budget);
   return through_rcm.fit ? through_rcm : free;
 }
 
@@ -260,9 +233,8 @@ bool MarkerSearch::fit_to_results(const SearchFrame& frame, WorkBudget& budget) 
   for (; !results_->empty(); results_->pop_back()) {
     if (!budget.allows(costs.fit_to_result())) return false;
     const PoseUnknowns start = agreement_->in_this_frame(frame.scene, results_->back(), budget);
-    const FineFit first = fitted(frame.scene, frame.light, start, {}, {}, budget);
-    if (validate(frame.scene, first) != Status::ok) continue;
-    const Found found = accepted(frame.scene, frame.light, first, {}, budget);
+    const Found found =
+        judged(frame.scene, frame.light, fitted(frame.scene, frame.light, start, {}, {}, budget), budget);
     if (!found.fit) continue;
     has_rivals_ |= candidate_ && are_rivals(*candidate_, *found.fit);
     if (!candidate_ || found.fit->misfit() < candidate_->misfit()) candidate_ = found.fit;
@@ -277,17 +249,13 @@ bool MarkerSearch::finish_agreement(const SearchFrame& frame, WorkBudget& budget
   return true;
 }
 
-// The best of all that the blobs' starts lead to.
+// The best of all that the starts on lines through the RCM lead to.
 Found MarkerSearch::hidden(const SearchFrame& frame, WorkBudget& budget) {
   const std::vector<Blob> blobs = joined_blobs(frame.blobs);
   const auto rest = hidden_.blobs.rest(blobs, reach_px(frame));
   if (agreement_ && !finish_agreement(frame, budget)) return {};
   for (const Blob* blob : rest) {
-    auto starts = starts_in(frame, *blob, frame.camera_from_rcm, budget).poses;
-    if (!frame.scene.others.empty()) {
-      const auto more = rcm_starts_in(frame, *blob, budget);
-      starts.insert(starts.end(), more.begin(), more.end());
-    }
+    const auto starts = starts_in(frame, true, *blob, budget).poses;
     for (std::size_t i = hidden_.blobs.start(); i < starts.size(); ++i) {
       agreement_ = AgreementSearch(starts[i], *frame.camera_from_rcm, frame.scene.marker.length_m());
       hidden_.blobs.stop(*blob, i + 1);
@@ -301,67 +269,14 @@ Found MarkerSearch::hidden(const SearchFrame& frame, WorkBudget& budget) {
   return {Status::ok, std::move(candidate_), {}};
 }
 
-// The starts of a shared blob, until one fits. One behind another that was found needs not show all bands.
-Found MarkerSearch::among_others_in(const SearchFrame& frame, const Blob& blob, WorkBudget& budget) {
-  const Scene& scene = frame.scene;
-  Found best;
-  budget.spend(costs.bands_in_order);
-  const bool may_show = !scene.others.empty() || shows_bands_in_order(scene, blob, *frame.camera_from_rcm);
-  const std::size_t first = among_others_.blobs.start();
-  if (may_show && !budget.allows(costs.starts_through_rcm(!scene.others.empty()) + costs.try_start())) {
-    among_others_.blobs.stop(blob, first);
-    return best;
-  }
-  std::vector<PoseUnknowns> starts;
-  if (may_show) starts = rcm_starts_in(frame, blob, budget);
-  for (std::size_t i = first; i < starts.size(); ++i) {
-    if (i > first && !budget.allows(costs.try_start())) {
-      among_others_.blobs.stop(blob, i);
-      return best;
-    }
-    Found found = try_start(scene, frame.light, starts[i], budget);
-    if (found.fit || found.status == Status::marker_mismatch) return found;
-    if (found.status != Status::no_marker) best = std::move(found);
-  }
-  among_others_.blobs.finish(blob);
-  return best;
-}
-
-Found MarkerSearch::among_others(const SearchFrame& frame, WorkBudget& budget) {
-  Found best;
-  for (const Blob* blob : among_others_.blobs.rest(frame.shared, reach_px(frame))) {
-    Found found = among_others_in(frame, *blob, budget);
-    if (found.fit || found.status == Status::marker_mismatch) {
-      among_others_.done = found.among_others = true;
-      return found;
-    }
-    if (found.status != Status::no_marker) best = std::move(found);
-    if (among_others_.blobs.stopped()) return best;
-  }
-  among_others_.done = true;
-  return best;
-}
-
 Found MarkerSearch::look_long(const SearchFrame& frame, bool is_mismatch, bool plain_is_known, WorkBudget& budget) {
-  Found seen;
-  // Instruments part while hidden markers are looked for, so shared blobs are looked at again by turns with that.
-  if (among_others_.done && !frame.shared.empty() && hidden_.blobs.begun() && !mismatch_among_others_ &&
-      (others_turn_ = !others_turn_))
-    among_others_ = {};
-  if (!among_others_.done && !is_mismatch) {
-    seen = among_others(frame, budget);
-    if (seen.fit || !among_others_.done) return seen;
-    mismatch_among_others_ = seen.status == Status::marker_mismatch;
-  }
-  is_mismatch |= mismatch_among_others_;
   if (!free_.done)
     if (Found found = despite_registration(frame, plain_is_known, budget); found.fit) return found;
-  if (!free_.done) return seen;
+  if (!free_.done) return {};
+  other_bands_ = free_.other_bands;
   // Such a print is not hidden: this is what the search came to.
   if (is_mismatch) hidden_.done = true;
-  if (hidden_.done) return seen;
-  Found found = hidden(frame, budget);
-  return found.fit || found.status == Status::ambiguous ? found : seen;
+  return hidden_.done ? Found{} : hidden(frame, budget);
 }
 
 Found MarkerSearch::look_with_rcm(const SearchFrame& frame, WorkBudget& budget) {
@@ -372,10 +287,11 @@ Found MarkerSearch::look_with_rcm(const SearchFrame& frame, WorkBudget& budget) 
   const WorkBudget::Beyond step = budget.allowed();
   // Half the budget, or by turns what a start takes, is for what shows plainly.
   longs_turn_ = searches_long_ && !longs_turn_;
-  const double half = budget.left() / 2, one_start = costs.initial_poses + costs.try_start();
+  const double half = budget.left() / 2,
+               one_start = costs.starts_in_blob(!frame.scene.others.empty()) + costs.try_start();
   const double share = !searches_long_ ? budget.left() : longs_turn_ ? half : std::max(half, one_start);
   Found plain = budget.share(share, longs_turn_ ? WorkBudget::Beyond::none : step,
-                             [&](WorkBudget& part) { return detect(frame, frame.camera_from_rcm, plain_, part); });
+                             [&](WorkBudget& part) { return detect(frame, true, plain_, part); });
   if (plain.fit) {
     begin_anew(Status::no_marker);
     return plain;

@@ -29,7 +29,6 @@ struct SearchFrame {
   const LightImage& light;
   const std::vector<Blob>& blobs;  ///< of the whole frame, largest first
   const std::optional<Rigid3>& camera_from_rcm;
-  const std::vector<Blob>& shared;  ///< those that may show other instruments as well
 };
 
 /// The marker near where it is expected.
@@ -41,10 +40,10 @@ Found follow(const Scene& scene, const LightImage& light, const PoseUnknowns& ex
 Found follow_through_rcm(const Scene& scene, const LightImage& light, const FineFit& free,
                          const Rigid3& camera_from_rcm, WorkBudget& budget);
 
-/// Looks for one marker all over a frame: first where a blob's outline says; with camera_from_rcm then along lines
-/// through it in blobs that are shared, without regard to it, and at last for markers that are hidden in large parts,
-/// which takes tens of milliseconds. What the budget does not allow is done in the frames to come, from where it
-/// stopped. What shows plainly is looked for in each of them.
+/// Looks for one marker all over a frame: first for what shows plainly, with camera_from_rcm on lines through it, else
+/// by the blobs' outlines; with camera_from_rcm then without regard to it, and at last for markers that are hidden in
+/// large parts, which takes tens of milliseconds. What the budget does not allow is done in the frames to come, from
+/// where it stopped. What shows plainly is looked for in each of them.
 class MarkerSearch {
  public:
   /// While the search goes on, the status is what it knows so far, or the last whole search came to.
@@ -59,17 +58,14 @@ class MarkerSearch {
   };
   enum class Rival { none, found, not_known_yet };
 
-  static Found detect_in_blob(const SearchFrame& frame, const std::optional<Rigid3>& camera_from_rcm, const Blob& blob,
-                              Walk& walk, WorkBudget& budget);
-  static Found detect(const SearchFrame& frame, const std::optional<Rigid3>& camera_from_rcm, Walk& walk,
-                      WorkBudget& budget);
+  static Found detect_in_blob(const SearchFrame& frame, bool through_rcm, const Blob& blob, Walk& walk,
+                              WorkBudget& budget);
+  static Found detect(const SearchFrame& frame, bool through_rcm, Walk& walk, WorkBudget& budget);
   static Rival look_for_rival(const SearchFrame& frame, const FineFit& fit, WorkBudget& budget);
   Found look_without_rcm(const SearchFrame& frame, WorkBudget& budget);
   Found look_with_rcm(const SearchFrame& frame, WorkBudget& budget);
   Found look_long(const SearchFrame& frame, bool is_mismatch, bool plain_is_known, WorkBudget& budget);
   Found despite_registration(const SearchFrame& frame, bool plain_is_known, WorkBudget& budget);
-  Found among_others(const SearchFrame& frame, WorkBudget& budget);
-  Found among_others_in(const SearchFrame& frame, const Blob& blob, WorkBudget& budget);
   Found hidden(const SearchFrame& frame, WorkBudget& budget);
   bool finish_agreement(const SearchFrame& frame, WorkBudget& budget);
   bool fit_to_results(const SearchFrame& frame, WorkBudget& budget);
@@ -79,11 +75,9 @@ class MarkerSearch {
 
   Status status_ = Status::no_marker;  // of the last whole look at what shows plainly
   bool other_bands_ = false;           // that look saw bands which the marker has at no azimuth
-  Walk plain_, among_others_, free_, hidden_;
-  bool mismatch_among_others_ = false;  // what is there is a print that is off
-  bool searches_long_ = false;          // what shows plainly was not found
+  Walk plain_, free_, hidden_;
+  bool searches_long_ = false;  // what shows plainly was not found
   bool longs_turn_ = false;
-  bool others_turn_ = false;  // of the long search's: shared blobs again
   std::optional<AgreementSearch> agreement_;
   std::optional<std::vector<PoseUnknowns>> results_;  // of agreement_, that are not fitted to yet; the next is the last
   std::optional<FineFit> candidate_;                  // the best so far, while others are looked for

@@ -4,22 +4,18 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
-#include <utility>
 #include <vector>
 
 #include "lapservo/core/angles.h"
 #include "lapservo/core/statistics.h"
-#include "lapservo/vision/search/explained_colours.h"
 #include "lapservo/vision/search/line_segmentation.h"
 
 namespace lapservo::internal {
 namespace {
 
-constexpr std::size_t line_count = 64, line_samples = 160, most_starts = 3;
-// Of the middle band's colour (fraction_in_order): another's marker has at most 0.04, and crossing ones' mostly 0.16
-// and more where one of them lies before the other.
-constexpr double least_in_order = 0.1;
+constexpr std::size_t line_count = 32, line_samples = 112, most_starts = 3;
 
 // Rays of the camera by their angles: alpha about the direction to the RCM, beta from it. A shaft's axis lies on one
 // alpha, from the RCM (beta = 0) to its tip.
@@ -33,9 +29,12 @@ class RaysFromRcm {
   double beta_rad(const Eigen::Vector3d& ray) const {
     return std::acos(std::clamp(ray.normalized().dot(pole_), -1.0, 1.0));
   }
+  const Eigen::Vector3d& pole() const { return pole_; }
+  Eigen::Vector3d across(double alpha_rad) const {
+    return std::cos(alpha_rad) * first_ + std::sin(alpha_rad) * second_;
+  }
   Eigen::Vector3d ray(double alpha_rad, double beta_rad) const {
-    return std::cos(beta_rad) * pole_ +
-           std::sin(beta_rad) * (std::cos(alpha_rad) * first_ + std::sin(alpha_rad) * second_);
+    return std::cos(beta_rad) * pole_ + std::sin(beta_rad) * across(alpha_rad);
   }
 
  private:
@@ -49,72 +48,56 @@ struct Fan {
   double beta_rad(double sample) const { return first_beta_rad + sample * step_beta_rad; }
 };
 
-// A place of a blob that has one of the marker's colours.
-struct Place {
-  double alpha_rad, beta_rad;
-  std::uint8_t colour;
-};
+// By band, the cosines of its samples' betas.
+using BandCosines = std::array<std::vector<double>, 3>;
 
-// Alpha is continuous over the blob.
-std::vector<Place> places_of(const Scene& scene, const Blob& blob, const RaysFromRcm& rays) {
-  std::vector<Place> places;
-  places.reserve(blob.samples.size());
+// Whether the middle band and another one show, as the inner boundaries tell psi, and no band lies wholly on the wrong
+// side of its neighbour, as in another marker's order. A blob of several markers may have all orders.
+bool may_be_in_order(BandCosines& bands) {
+  constexpr std::size_t min_samples = 2;
+  constexpr double quarter = 0.25;
+  const auto shows = [&](std::size_t band) { return bands[band].size() >= min_samples; };
+  const auto is_contradicted = [&](std::size_t band) {
+    return shows(band) && shows(band + 1) && quantile(bands[band], 1 - quarter) < quantile(bands[band + 1], quarter);
+  };
+  return shows(1) && (shows(0) || shows(2)) && !is_contradicted(0) && !is_contradicted(1);
+}
+
+// Over a blob's samples of the marker's colours, and as far beyond them as they are apart. Nullopt where they lie in
+// another order, or on all sides of the RCM's image: the shaft points at the camera.
+std::optional<Fan> fan_over(const Scene& scene, const Blob& blob, const RaysFromRcm& rays) {
+  constexpr double least_sine = 0.05;
+  std::optional<double> alpha_rad;  // of the first sample
+  Eigen::Vector3d ahead, aside;
+  double least_tangent = 1e9, most_tangent = -1e9, least_cosine = 1, most_cosine = -1;
+  BandCosines bands;
   for (const Blob::Sample& sample : blob.samples) {
-    if (!scene.is_ours(sample.colour)) continue;
+    const auto band = std::find(scene.bands.begin(), scene.bands.end(), sample.colour);
+    if (band == scene.bands.end()) continue;
     const auto ideal_px = scene.camera.ideal_from_raw(Eigen::Vector2d(sample.u, sample.v));
     if (!ideal_px) continue;
-    const Eigen::Vector3d ray = scene.camera.ray_from_ideal(*ideal_px);
-    const double alpha_rad = rays.alpha_rad(ray);
-    const double middle_rad = places.empty() ? alpha_rad : places.front().alpha_rad;
-    places.push_back({middle_rad + wrap_pi(alpha_rad - middle_rad), rays.beta_rad(ray), sample.colour});
+    const Eigen::Vector3d ray = scene.camera.ray_from_ideal(*ideal_px).normalized();
+    if (!alpha_rad) {
+      alpha_rad = rays.alpha_rad(ray);
+      ahead = rays.across(*alpha_rad), aside = rays.pole().cross(ahead);
+    }
+    if (!(ray.dot(ahead) > 0)) return std::nullopt;
+    const double tangent = ray.dot(aside) / ray.dot(ahead), cosine = ray.dot(rays.pole());
+    least_tangent = std::min(least_tangent, tangent), most_tangent = std::max(most_tangent, tangent);
+    least_cosine = std::min(least_cosine, cosine), most_cosine = std::max(most_cosine, cosine);
+    bands[static_cast<std::size_t>(band - scene.bands.begin())].push_back(cosine);
   }
-  return places;
-}
-
-std::optional<Fan> fan_over(const std::vector<Place>& places) {
-  if (places.empty()) return std::nullopt;
-  double first_alpha = 1e9, last_alpha = -1e9, first_beta = 1e9, last_beta = -1e9;
-  for (const Place& place : places) {
-    first_alpha = std::min(first_alpha, place.alpha_rad), last_alpha = std::max(last_alpha, place.alpha_rad);
-    first_beta = std::min(first_beta, place.beta_rad), last_beta = std::max(last_beta, place.beta_rad);
-  }
-  // All round: the shaft points at the camera.
-  if (last_alpha - first_alpha > pi) return std::nullopt;
-  const double margin_rad = 0.2 * (last_beta - first_beta) + 0.01;
-  first_beta = std::max(0.0, first_beta - margin_rad), last_beta = std::min(pi, last_beta + margin_rad);
-  return Fan{first_alpha, std::max(1e-6, (last_alpha - first_alpha) / (line_count - 1)), first_beta,
-             (last_beta - first_beta) / line_samples};
-}
-
-// How much of the middle band's colour lies between the others, as seen from the RCM, as in a marker that nothing hides
-// and of which most shows. In another's, whose bands have another order, it doesn't, and to see that costs next to
-// nothing.
-double fraction_in_order(const Scene& scene, const Fan& fan, const std::vector<Place>& places) {
-  constexpr std::size_t parts = 16;
-  struct Part {
-    std::vector<double> first_rad, last_rad;  // the first band's places and the last one's
-  };
-  std::array<Part, parts> all;
-  const auto part_of = [&](const Place& place) -> Part& {
-    const double line = (place.alpha_rad - fan.first_alpha_rad) / fan.step_alpha_rad;
-    return all[std::min(parts - 1, static_cast<std::size_t>(std::max(0.0, line)) * parts / line_count)];
-  };
-  for (const Place& place : places) {
-    if (place.colour == scene.bands[0]) part_of(place).first_rad.push_back(place.beta_rad);
-    if (place.colour == scene.bands[2]) part_of(place).last_rad.push_back(place.beta_rad);
-  }
-  int middle = 0, in_order = 0;
-  for (const Place& place : places) {
-    if (place.colour != scene.bands[1]) continue;
-    const Part& part = part_of(place);
-    const auto before = std::count_if(part.first_rad.begin(), part.first_rad.end(),
-                                      [&](double beta_rad) { return beta_rad < place.beta_rad; });
-    const auto behind = std::count_if(part.last_rad.begin(), part.last_rad.end(),
-                                      [&](double beta_rad) { return beta_rad > place.beta_rad; });
-    constexpr int enough = 3;
-    ++middle, in_order += before >= enough && behind >= enough;
-  }
-  return in_order / std::max(1.0, static_cast<double>(middle));
+  if (!may_be_in_order(bands)) return std::nullopt;
+  const double first_beta = std::acos(std::min(1.0, most_cosine)), last_beta = std::acos(std::max(-1.0, least_cosine));
+  const double alpha_margin_rad =
+      blob.grid_px / scene.camera.fx_px / std::max(least_sine, std::sin((first_beta + last_beta) / 2));
+  const double beta_margin_rad = 0.2 * (last_beta - first_beta) + 0.01;
+  const double first_alpha_rad = *alpha_rad + std::atan(least_tangent) - alpha_margin_rad;
+  const double last_alpha_rad = *alpha_rad + std::atan(most_tangent) + alpha_margin_rad;
+  const double from_rad = std::max(0.0, first_beta - beta_margin_rad);
+  const double to_rad = std::min(pi, last_beta + beta_margin_rad);
+  return Fan{first_alpha_rad, (last_alpha_rad - first_alpha_rad) / (line_count - 1), from_rad,
+             (to_rad - from_rad) / line_samples};
 }
 
 // A line's split into the bands, and how well it agrees [samples].
@@ -126,12 +109,28 @@ struct Line {
 
 using Lines = std::array<Line, line_count>;
 
-Line line_at(const Scene& scene, const RaysFromRcm& rays, const Fan& fan, std::size_t i) {
+// Cosine and sine of each sample's beta: all lines have the same.
+using Samples = std::array<Eigen::Vector2d, line_samples>;
+
+Samples samples_of(const Fan& fan) {
+  Samples samples;
+  for (std::size_t k = 0; k < line_samples; ++k) {
+    const double beta_rad = fan.beta_rad(static_cast<double>(k) + 0.5);
+    samples[k] = {std::cos(beta_rad), std::sin(beta_rad)};
+  }
+  return samples;
+}
+
+std::uint8_t class_on_ray(const Scene& scene, const Eigen::Vector3d& ray) {
+  return scene.field.contains(ray) ? scene.class_beside(scene.camera.raw_from_point(ray)) : Scene::outside;
+}
+
+Line line_at(const Scene& scene, const RaysFromRcm& rays, double alpha_rad, const Samples& samples) {
+  const Eigen::Vector3d across = rays.across(alpha_rad);
   std::array<std::uint8_t, line_samples> classes;
   for (std::size_t k = 0; k < line_samples; ++k) {
-    const Eigen::Vector3d ray =
-        rays.ray(fan.alpha_rad(static_cast<double>(i)), fan.beta_rad(static_cast<double>(k) + 0.5));
-    classes[k] = scene.field.contains(ray) ? scene.class_beside(scene.camera.raw_from_point(ray)) : Scene::outside;
+    const Eigen::Vector3d ray = samples[k].x() * rays.pole() + samples[k].y() * across;
+    classes[k] = class_on_ray(scene, ray);
   }
   Line line{segment_line(classes, scene.bands)};
   std::size_t state = 0;
@@ -181,9 +180,27 @@ std::vector<Window> best_windows(const Scene& scene, const Fan& fan, const Lines
 struct Extent {
   double alpha_rad, width_rad;
   std::optional<double> first_beta_rad, last_beta_rad;
+  std::optional<double> only_side_rad;  // alpha of the side that shows where the other one is hidden, and in
+  double away_from_side = 0;            // which direction of alpha the axis lies
+  double sine_of_beta = 1;
 };
 
-Extent extent_of(const Fan& fan, const Lines& lines, const Window& window) {
+// Whether nothing shows beside a line of the fan, by the image's border or another instrument, on most places from
+// first to last.
+bool is_hidden(const Scene& scene, const RaysFromRcm& rays, double alpha_rad, double first_beta_rad,
+               double last_beta_rad) {
+  constexpr int places = 5;
+  int hidden = 0;
+  for (int i = 0; i < places; ++i) {
+    const Eigen::Vector3d ray =
+        rays.ray(alpha_rad, first_beta_rad + (last_beta_rad - first_beta_rad) * (i + 0.5) / places);
+    hidden += class_on_ray(scene, ray) == Scene::outside;
+  }
+  return 2 * hidden > places;
+}
+
+Extent extent_of(const Scene& scene, const RaysFromRcm& rays, const Fan& fan, const Lines& lines,
+                 const Window& window) {
   double most = 0;
   for (std::size_t i = 0; i < line_count; ++i)
     if (window.has(i)) most = std::max(most, lines[i].score);
@@ -202,8 +219,13 @@ Extent extent_of(const Fan& fan, const Lines& lines, const Window& window) {
   };
   Extent extent{fan.alpha_rad(sum / count), 0, of_two_or_more(first), of_two_or_more(last)};
   const Line& middle = lines[window.middle];
-  const double beta_rad = fan.beta_rad((middle.split.position[0] + middle.split.position[3]) / 2);
-  extent.width_rad = (highest - lowest + 1) * fan.step_alpha_rad * std::sin(beta_rad);
+  const double from_rad = fan.beta_rad(middle.split.position[0]), to_rad = fan.beta_rad(middle.split.position[3]);
+  extent.sine_of_beta = std::sin((from_rad + to_rad) / 2);
+  extent.width_rad = (highest - lowest + 1) * fan.step_alpha_rad * extent.sine_of_beta;
+  const double low_rad = fan.alpha_rad(lowest - 1), high_rad = fan.alpha_rad(highest + 1);
+  const bool low_hidden = is_hidden(scene, rays, low_rad, from_rad, to_rad);
+  if (low_hidden == is_hidden(scene, rays, high_rad, from_rad, to_rad)) return extent;
+  extent.only_side_rad = low_hidden ? high_rad : low_rad, extent.away_from_side = low_hidden ? -1 : 1;
   return extent;
 }
 
@@ -238,7 +260,11 @@ std::optional<PoseUnknowns> start_of(const Scene& scene, const RaysFromRcm& rays
     first_beta_rad = *extent.last_beta_rad - scene.marker.length_m() / distance_m;
   }
   const double distance_m = distance_of(scene, rays, extent, first_beta_rad, rcm_m);
-  const auto q = configuration_through(camera_from_rcm, distance_m * rays.ray(extent.alpha_rad, first_beta_rad));
+  double alpha_rad = extent.alpha_rad;
+  if (extent.only_side_rad)
+    alpha_rad = *extent.only_side_rad +
+                extent.away_from_side * scene.marker.radius_m() / (distance_m * std::max(0.05, extent.sine_of_beta));
+  const auto q = configuration_through(camera_from_rcm, distance_m * rays.ray(alpha_rad, first_beta_rad));
   return q ? std::optional(PoseUnknowns::rcm(camera_from_rcm, *q)) : std::nullopt;
 }
 
@@ -246,38 +272,22 @@ std::optional<PoseUnknowns> start_of(const Scene& scene, const RaysFromRcm& rays
 std::vector<PoseUnknowns> starts_on_lines(const Scene& scene, const RaysFromRcm& rays, const Fan& fan,
                                           const Rigid3& camera_from_rcm) {
   Lines lines;
-  for (std::size_t i = 0; i < line_count; ++i) lines[i] = line_at(scene, rays, fan, i);
+  const Samples samples = samples_of(fan);
+  for (std::size_t i = 0; i < line_count; ++i)
+    lines[i] = line_at(scene, rays, fan.alpha_rad(static_cast<double>(i)), samples);
   std::vector<PoseUnknowns> starts;
   for (const Window& window : best_windows(scene, fan, lines))
-    if (auto start = start_of(scene, rays, extent_of(fan, lines, window), camera_from_rcm))
+    if (auto start = start_of(scene, rays, extent_of(scene, rays, fan, lines, window), camera_from_rcm))
       starts.push_back(std::move(*start));
   return starts;
 }
 
-// By the area of colours that they explain, most first.
-std::vector<PoseUnknowns> best_first(const Scene& scene, const std::vector<PoseUnknowns>& starts) {
-  std::vector<std::pair<double, std::size_t>> order;
-  for (std::size_t i = 0; i < starts.size(); ++i)
-    order.emplace_back(-explained_area_px2(scene, starts[i].pose(), false), i);
-  std::sort(order.begin(), order.end());
-  std::vector<PoseUnknowns> sorted;
-  for (const auto& place : order) sorted.push_back(starts[place.second]);
-  return sorted;
-}
-
 }  // namespace
-
-bool shows_bands_in_order(const Scene& scene, const Blob& blob, const Rigid3& camera_from_rcm) {
-  if (!(camera_from_rcm.translation.norm() > 1e-3)) return false;
-  const std::vector<Place> places = places_of(scene, blob, RaysFromRcm(camera_from_rcm));
-  const auto fan = fan_over(places);
-  return fan && fraction_in_order(scene, *fan, places) >= least_in_order;
-}
 
 std::vector<PoseUnknowns> starts_through_rcm(const Scene& scene, const Blob& blob, const Rigid3& camera_from_rcm) {
   if (!(camera_from_rcm.translation.norm() > 1e-3)) return {};
   const RaysFromRcm rays(camera_from_rcm);
-  const auto fan = fan_over(places_of(scene, blob, rays));
+  const auto fan = fan_over(scene, blob, rays);
   if (!fan) return {};
   auto starts = starts_on_lines(scene, rays, *fan, camera_from_rcm);
   if (scene.others.empty()) return starts;
@@ -285,7 +295,7 @@ std::vector<PoseUnknowns> starts_through_rcm(const Scene& scene, const Blob& blo
   alone.others = {};
   const auto more = starts_on_lines(alone, rays, *fan, camera_from_rcm);
   starts.insert(starts.end(), more.begin(), more.end());
-  return best_first(scene, starts);
+  return starts;
 }
 
 }  // namespace lapservo::internal

@@ -43,18 +43,14 @@ Blob largest_blob(const Shot& shot) {
   return largest_blobs(shot.sight.view(), shot.sight.classes()).at(0);
 }
 
-TEST(Starts, ABlobsOutlineTellsThePoseWithTheRcmAndWithout) {
+TEST(Starts, ABlobsOutlineTellsThePose) {
   for (std::uint64_t seed = 1; seed <= shots; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     const Shot& shot = usual_shot(seed);
-    const InitialPoses through_rcm =
-        initial_poses(shot.sight.scene(), largest_blob(shot), shot.rig.instruments[0].camera_from_rcm);
-    const InitialPoses free = initial_poses(shot.sight.scene(), largest_blob(shot), std::nullopt);
-    EXPECT_TRUE(any_is_near(shot, through_rcm.poses));
+    const InitialPoses free = initial_poses(shot.sight.scene(), largest_blob(shot));
     EXPECT_TRUE(any_is_near(shot, free.poses));
-    for (const PoseUnknowns& start : through_rcm.poses) EXPECT_TRUE(start.q());
     for (const PoseUnknowns& start : free.poses) EXPECT_FALSE(start.q());
-    EXPECT_FALSE(through_rcm.other_bands || free.other_bands);
+    EXPECT_FALSE(free.other_bands);
   }
 }
 
@@ -66,7 +62,28 @@ TEST(Starts, LinesThroughTheRcmTellThePose) {
     const auto starts = starts_through_rcm(shot.sight.scene(), largest_blob(shot), camera_from_rcm);
     EXPECT_LE(starts.size(), 3U);
     EXPECT_TRUE(any_is_near(shot, starts));
-    EXPECT_TRUE(shows_bands_in_order(shot.sight.scene(), largest_blob(shot), camera_from_rcm));
+  }
+}
+
+// A shaft along the rows, of which the image shows the upper half or less.
+TEST(Starts, ASideBeyondTheBorderIsADiameterFromTheOther) {
+  Rig rig = scenes::usual_rig();
+  Rigid3& camera_from_rcm = *rig.instruments[0].camera_from_rcm;
+  camera_from_rcm.translation = {-0.12, 0, 0.1};
+  const double length_m = rig.instruments[0].marker.length_m(), radius_m = rig.instruments[0].marker.radius_m();
+  const JointVector q = configuration_through(camera_from_rcm, {-length_m / 2, 0, 0.1}).value();
+  const cv::Mat whole = scenes::render(rig, {q}, 1);
+  const double radius_px = radius_m / 0.1 * rig.camera.fy_px, axis_px = rig.camera.cy_px;
+  for (const double shown : {-0.4, 0.0, 0.4}) {
+    SCOPED_TRACE("so many radii beside the axis: " + std::to_string(shown));
+    rig.camera.height_px = static_cast<int>(axis_px + shown * radius_px);
+    const scenes::Sight sight(rig, whole.rowRange(0, rig.camera.height_px));
+    const auto starts = starts_through_rcm(sight.scene(), largest_blobs(sight.view(), sight.classes()).at(0),
+                                           *rig.instruments[0].camera_from_rcm);
+    ASSERT_FALSE(starts.empty());
+    const Rigid3& pose = starts[0].pose().camera_from_unrolled;
+    EXPECT_NEAR(rig.camera.raw_from_point(pose.translation).y(), axis_px, 0.25 * radius_px);
+    EXPECT_NEAR(pose.translation.z(), 0.1, 0.01);
   }
 }
 
@@ -77,8 +94,8 @@ TEST(Starts, AnotherOrderOfColoursIsNoStart) {
     const Shot& shot = usual_shot(seed);
     Scene another = shot.sight.scene();
     std::swap(another.bands[1], another.bands[2]);
-    EXPECT_TRUE(initial_poses(another, largest_blob(shot), std::nullopt).poses.empty());
-    EXPECT_FALSE(shows_bands_in_order(another, largest_blob(shot), *shot.rig.instruments[0].camera_from_rcm));
+    EXPECT_TRUE(initial_poses(another, largest_blob(shot)).poses.empty());
+    EXPECT_TRUE(starts_through_rcm(another, largest_blob(shot), *shot.rig.instruments[0].camera_from_rcm).empty());
   }
 }
 

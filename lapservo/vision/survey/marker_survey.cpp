@@ -11,6 +11,7 @@
 #include "lapservo/vision/image/light_image.h"
 #include "lapservo/vision/search/coarse_fit.h"
 #include "lapservo/vision/search/initial_pose.h"
+#include "lapservo/vision/search/rcm_starts.h"
 
 namespace lapservo::internal {
 namespace {
@@ -71,7 +72,7 @@ MarkerSurvey::MarkerSurvey(const Rig& rig, std::size_t instrument)
     : rig_(rig), instrument_(instrument), classes_(rig.instruments), light_(rig.camera.response.table()) {}
 
 std::optional<Sighting> MarkerSurvey::follow(const Scene& scene, const LightImage& light) const {
-  const CoarseFit coarse = fit_coarsely(scene, last_->unknowns, from_memory);
+  const CoarseFit coarse = fit_coarsely(scene, last_->unknowns, Rotation::known);
   if (!coarse.found) return std::nullopt;
   auto sighting = refined(scene, light, coarse, last_->blur, last_->departure);
   return sighting && sighting->settled ? sighting : std::nullopt;
@@ -82,7 +83,7 @@ std::optional<Sighting> MarkerSurvey::detect(const Scene& scene, const LightImag
   std::optional<Sighting> best;
   double best_score = 0;
   const auto try_start = [&](const PoseUnknowns& start) {
-    const CoarseFit coarse = fit_coarsely(scene, PoseUnknowns::free(start.pose()), {});
+    const CoarseFit coarse = fit_coarsely(scene, PoseUnknowns::free(start.pose()), Rotation::unknown);
     if (!coarse.shows_rotation() || coarse.has_rival()) return;
     const auto sighting = refined(scene, light, coarse, {}, {});
     if (!sighting) return;
@@ -91,9 +92,9 @@ std::optional<Sighting> MarkerSurvey::detect(const Scene& scene, const LightImag
   };
   for (const Blob& blob : blobs) {
     if (const auto& camera_from_rcm = rig_.instruments[instrument_].camera_from_rcm)
-      for (const PoseUnknowns& start : initial_poses(scene, blob, camera_from_rcm).poses) try_start(start);
+      for (const PoseUnknowns& start : starts_through_rcm(scene, blob, *camera_from_rcm)) try_start(start);
     if (!best || !best->settled)
-      for (const PoseUnknowns& start : initial_poses(scene, blob, std::nullopt).poses) try_start(start);
+      for (const PoseUnknowns& start : initial_poses(scene, blob).poses) try_start(start);
     if (best && best->settled) break;
   }
   return best;
