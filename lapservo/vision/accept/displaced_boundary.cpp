@@ -54,7 +54,7 @@ bool may_be_displaced(const FineFit& fit) {
 }
 
 bool is_displaced(const Scene& scene, const LightImage& light, const FineFit& fit) {
-  constexpr Effort farther{8, 8, 3, 1};
+  constexpr Effort farther{8, 0, 3, 1};
   const DepartedLight seen(light, fit.departure);
   const EdgeMeasurements edges = measure_edges(scene, seen.light(), fit.unknowns, film_mean_m, farther, fit.blur);
   for (const std::size_t boundary : {1U, 2U})

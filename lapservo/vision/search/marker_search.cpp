@@ -53,7 +53,13 @@ Found try_start(const Scene& scene, const LightImage& light, const PoseUnknowns&
   const CoarseFit coarse = fitted_coarsely(scene, start, Rotation::unknown, budget);
   if (!coarse.shows_rotation()) return {};
   if (coarse.has_rival()) return refusal(Status::ambiguous, coarse.unknowns);
-  return judged(scene, light, fitted(scene, light, coarse.unknowns, {}, {}, budget), budget);
+  const auto fitted_from = [&](const PoseUnknowns& pose) {
+    return judged(scene, light, fitted(scene, light, pose, {}, {}, budget), budget);
+  };
+  Found first = fitted_from(coarse.unknowns);
+  if (first.fit || first.status == Status::marker_mismatch) return first;
+  const CoarseFit nearer = fitted_coarsely(scene, coarse.unknowns, Rotation::known, budget);
+  return nearer.found ? fitted_from(nearer.unknowns) : first;
 }
 
 // Two fits of one marker that are both ok: of what blood leaves both can't be sure.
@@ -86,7 +92,8 @@ Found follow(const Scene& scene, const LightImage& light, const PoseUnknowns& ex
   const auto fitted_from = [&](const PoseUnknowns& start) {
     return judged(scene, light, fitted(scene, light, start, blur, processing, budget), budget);
   };
-  if (Found near = fitted_from(expected); near.fit) return near;
+  Found near = fitted_from(expected);
+  if (near.fit || near.status == Status::marker_mismatch) return near;
   const CoarseFit coarse = fitted_coarsely(scene, expected, Rotation::known, budget);
   return coarse.found ? fitted_from(coarse.unknowns) : Found{};
 }
