@@ -10,7 +10,7 @@ namespace lapservo::internal {
 /// whether it is the marker that was fitted. How many wrong ones pass: docs/notes/accuracy.md, "False accepts".
 struct ValidationLimits {
   double max_sigma_psi_rad = 0.02;  ///< five sigma: a tenth of a radian, from which on psi counts as wrong
-  /// And of psi as it is told, with what one side alone or a turn within the exposure add.
+  /// And of psi as it is told, with what a turn within the exposure adds.
   double max_sigma_told_rad = 0.04;
   double certainly_off = 0.9;  ///< probability from which on the print is to blame
   /// Times what the rig's tolerance_m adds to the variance and to p_false: who sets it wants to live with it.
