@@ -31,12 +31,16 @@ CoarseFit fitted_coarsely(const Scene& scene, const PoseUnknowns& start, Rotatio
   return fit;
 }
 
-// What the fine fit from a start comes to: it is ok, unless it is refused or a boundary shows elsewhere.
-Found fitted(const Scene& scene, const LightImage& light, const PoseUnknowns& start, const EdgeBlur& blur,
-             const ExpectedProcessing& processing, WorkBudget& budget) {
+FineFit fitted(const Scene& scene, const LightImage& light, const PoseUnknowns& start, const EdgeBlur& blur,
+               const ExpectedProcessing& processing, WorkBudget& budget) {
   FineFit fit = fit_finely(scene, light, start, blur, processing);
   budget.spend(fit.passes * costs.fine_pass + (fit.converged ? costs.fine_end : 0) +
                fit.processing_explained * costs.processing + fit.asked_for_departure * costs.departure);
+  return fit;
+}
+
+// A fit is ok unless it is refused or a boundary shows elsewhere.
+Found judged(const Scene& scene, const LightImage& light, FineFit fit, WorkBudget& budget) {
   Status status = validate(scene, fit);
   if (status == Status::ok && may_be_displaced(fit)) {
     budget.spend(costs.fine_pass);
@@ -49,10 +53,7 @@ Found try_start(const Scene& scene, const LightImage& light, const PoseUnknowns&
   const CoarseFit coarse = fitted_coarsely(scene, start, Rotation::unknown, budget);
   if (!coarse.shows_rotation()) return {};
   if (coarse.has_rival()) return refusal(Status::ambiguous, coarse.unknowns);
-  Found first = fitted(scene, light, coarse.unknowns, {}, {}, budget);
-  if (first.fit || first.status == Status::marker_mismatch) return first;
-  const CoarseFit nearer = fitted_coarsely(scene, coarse.unknowns, Rotation::known, budget);
-  return nearer.found ? fitted(scene, light, nearer.unknowns, {}, {}, budget) : first;
+  return follow(scene, light, coarse.unknowns, {}, {}, budget);
 }
 
 // Two fits of one marker that are both ok: of what blood leaves both can't be sure.
@@ -82,10 +83,11 @@ InitialPoses starts_in(const SearchFrame& frame, bool through_rcm, const Blob& b
 
 Found follow(const Scene& scene, const LightImage& light, const PoseUnknowns& expected, const EdgeBlur& blur,
              const ExpectedProcessing& processing, WorkBudget& budget) {
-  Found near = fitted(scene, light, expected, blur, processing, budget);
-  if (near.fit || near.status == Status::marker_mismatch) return near;
-  const CoarseFit coarse = fitted_coarsely(scene, expected, Rotation::known, budget);
-  return coarse.found ? fitted(scene, light, coarse.unknowns, blur, processing, budget) : Found{};
+  FineFit fit = fitted(scene, light, expected, blur, processing, budget);
+  if (!fit.converged)
+    if (const CoarseFit coarse = fitted_coarsely(scene, expected, Rotation::known, budget); coarse.found)
+      fit = fitted(scene, light, coarse.unknowns, blur, processing, budget);
+  return judged(scene, light, std::move(fit), budget);
 }
 
 Found follow_through_rcm(const Scene& scene, const LightImage& light, const FineFit& free,
@@ -100,7 +102,7 @@ Found follow_through_rcm(const Scene& scene, const LightImage& light, const Fine
   const Eigen::Vector2d tilt_rad = z.cross(axis).head<2>();  // the first two unknowns of a free pose
   if (!(tilt_rad.dot(free.covariance.topLeftCorner<2, 2>().inverse() * tilt_rad) < most_sigmas * most_sigmas))
     return {};
-  return fitted(scene, light, start, free.blur, {false, free.bias_px, free.departure}, budget);
+  return follow(scene, light, start, free.blur, {false, free.bias_px, free.departure}, budget);
 }
 
 // The starts of one blob, until one fits. Without the RCM they are rivals: all are tried then, in one frame.
@@ -229,7 +231,7 @@ bool MarkerSearch::fit_to_results(const SearchFrame& frame, WorkBudget& budget) 
   for (; !results_->empty(); results_->pop_back()) {
     if (!budget.allows(costs.fit_to_result())) return false;
     const PoseUnknowns start = agreement_->in_this_frame(frame.scene, results_->back(), budget);
-    const Found found = fitted(frame.scene, frame.light, start, {}, {}, budget);
+    const Found found = follow(frame.scene, frame.light, start, {}, {}, budget);
     if (!found.fit) continue;
     has_rivals_ |= candidate_ && are_rivals(*candidate_, *found.fit);
     if (!candidate_ || found.fit->misfit() < candidate_->misfit()) candidate_ = found.fit;
