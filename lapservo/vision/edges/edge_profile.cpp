@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include <Eigen/Cholesky>
 
@@ -48,74 +49,102 @@ Basis<2> contour_basis(const EdgeProfile& profile, float edge_px, float blur_px,
   return basis;
 }
 
+template <int Shapes>
+using Amplitudes = Eigen::Matrix<float, Shapes + 1, 1>;  // of a constant and the shapes
+
+template <int Shapes>
+Amplitudes<Shapes> row_of(const Basis<Shapes>& basis, std::size_t sample) {
+  Amplitudes<Shapes> row;
+  row[0] = 1;
+  for (int s = 0; s < Shapes; ++s) row[s + 1] = basis.value[static_cast<std::size_t>(s)][sample];
+  return row;
+}
+
+// The amplitudes that fit one channel best.
+template <int Shapes>
+struct ChannelFit {
+  Eigen::LDLT<Eigen::Matrix<float, Shapes + 1, Shapes + 1>> solver;
+  Amplitudes<Shapes> amplitude;
+  int used = 0;  // samples
+};
+
+// Nullopt where the channel has too few samples.
+template <int Shapes>
+std::optional<ChannelFit<Shapes>> fit_channel(const EdgeProfile& profile, const Basis<Shapes>& basis, std::size_t c) {
+  constexpr int more_than_unknowns = 4;
+  Eigen::Matrix<float, Shapes + 1, Shapes + 1> normal;
+  normal.setZero();
+  Amplitudes<Shapes> light_sum = Amplitudes<Shapes>::Zero();
+  ChannelFit<Shapes> channel;
+  for (std::size_t i = 0; i < profile.count; ++i) {
+    if (!profile.usable[c][i]) continue;
+    const Amplitudes<Shapes> row = row_of(basis, i);
+    normal.noalias() += row * row.transpose();
+    light_sum.noalias() += profile.light[c][i] * row;
+    ++channel.used;
+  }
+  if (channel.used < Shapes + 1 + more_than_unknowns) return std::nullopt;
+  normal.diagonal().array() += 1e-5F;
+  channel.solver.compute(normal);
+  channel.amplitude = channel.solver.solve(light_sum);
+  return channel;
+}
+
+// Sums over the channels, of what their amplitudes can't imitate.
+struct PositionSums {
+  float position_gradient = 0, position_and_blur = 0, squares = 0;
+  int degrees = -1;
+};
+
+template <int Shapes>
+void add_channel(const EdgeProfile& profile, const Basis<Shapes>& basis, std::size_t c,
+                 const ChannelFit<Shapes>& channel, EdgeFit& fit, PositionSums& sums) {
+  // Derivatives of the model.
+  std::array<float, EdgeProfile::max_samples> position, blur, miss;
+  Amplitudes<Shapes> position_sum = Amplitudes<Shapes>::Zero(), blur_sum = Amplitudes<Shapes>::Zero();
+  for (std::size_t i = 0; i < profile.count; ++i) {
+    if (!profile.usable[c][i]) continue;
+    const Amplitudes<Shapes> row = row_of(basis, i);
+    position[i] = blur[i] = 0;
+    for (int s = 0; s < Shapes; ++s) {
+      position[i] += channel.amplitude[s + 1] * basis.by_position[static_cast<std::size_t>(s)][i];
+      blur[i] += channel.amplitude[s + 1] * basis.by_blur[static_cast<std::size_t>(s)][i];
+    }
+    miss[i] = profile.light[c][i] - channel.amplitude.dot(row);
+    position_sum += position[i] * row;
+    blur_sum += blur[i] * row;
+  }
+  const Amplitudes<Shapes> position_part = channel.solver.solve(position_sum),
+                           blur_part = channel.solver.solve(blur_sum);
+  for (std::size_t i = 0; i < profile.count; ++i) {
+    if (!profile.usable[c][i]) continue;
+    const Amplitudes<Shapes> row = row_of(basis, i);
+    const float p = position[i] - position_part.dot(row), b = blur[i] - blur_part.dot(row);
+    sums.position_gradient += p * miss[i];
+    fit.information += p * p;
+    fit.blur_gradient += b * miss[i];
+    fit.blur_information += b * b;
+    sums.position_and_blur += p * b;
+    sums.squares += miss[i] * miss[i];
+  }
+  sums.degrees += channel.used - (Shapes + 1);
+  fit.step[c] = channel.amplitude.template tail<Shapes>().sum();
+  fit.before[c] = channel.amplitude[0];
+}
+
 // One variable-projection step: linear amplitudes per channel, then the position in what they leave.
 template <int Shapes>
 EdgeFit project(const EdgeProfile& profile, const Basis<Shapes>& basis) {
-  constexpr int linear = Shapes + 1;
-  using Matrix = Eigen::Matrix<float, linear, linear>;
-  using Vector = Eigen::Matrix<float, linear, 1>;
   EdgeFit fit;
-  float position_gradient = 0, position_and_blur = 0, squares = 0;
-  int degrees = -1;
-  for (std::size_t c = 0; c < 3; ++c) {
-    Matrix normal = Matrix::Zero();
-    Vector light_sum = Vector::Zero();
-    int used = 0;
-    const auto row = [&](std::size_t i) {
-      Vector a;
-      a[0] = 1;
-      for (int s = 0; s < Shapes; ++s) a[s + 1] = basis.value[static_cast<std::size_t>(s)][i];
-      return a;
-    };
-    for (std::size_t i = 0; i < profile.count; ++i) {
-      if (!profile.usable[c][i]) continue;
-      const Vector a = row(i);
-      normal.noalias() += a * a.transpose();
-      light_sum.noalias() += profile.light[c][i] * a;
-      ++used;
-    }
-    if (used < linear + 4) continue;
-    normal.diagonal().array() += 1e-5F;
-    const Eigen::LDLT<Matrix> solver(normal);
-    const Vector amplitude = solver.solve(light_sum);
-
-    // Derivatives of the model, and their parts that the amplitudes can't imitate.
-    std::array<float, EdgeProfile::max_samples> position, blur, miss;
-    Vector position_sum = Vector::Zero(), blur_sum = Vector::Zero();
-    for (std::size_t i = 0; i < profile.count; ++i) {
-      if (!profile.usable[c][i]) continue;
-      const Vector a = row(i);
-      position[i] = blur[i] = 0;
-      for (int s = 0; s < Shapes; ++s) {
-        position[i] += amplitude[s + 1] * basis.by_position[static_cast<std::size_t>(s)][i];
-        blur[i] += amplitude[s + 1] * basis.by_blur[static_cast<std::size_t>(s)][i];
-      }
-      miss[i] = profile.light[c][i] - amplitude.dot(a);
-      position_sum += position[i] * a;
-      blur_sum += blur[i] * a;
-    }
-    const Vector position_part = solver.solve(position_sum), blur_part = solver.solve(blur_sum);
-    for (std::size_t i = 0; i < profile.count; ++i) {
-      if (!profile.usable[c][i]) continue;
-      const Vector a = row(i);
-      const float p = position[i] - position_part.dot(a), b = blur[i] - blur_part.dot(a);
-      position_gradient += p * miss[i];
-      fit.information += p * p;
-      fit.blur_gradient += b * miss[i];
-      fit.blur_information += b * b;
-      position_and_blur += p * b;
-      squares += miss[i] * miss[i];
-    }
-    degrees += used - linear;
-    fit.step[c] = amplitude.tail(Shapes).sum();
-    fit.before[c] = amplitude[0];
-  }
-  if (degrees < 3 || !(fit.information > min_edge_information)) return fit;
-  fit.offset_px = position_gradient / fit.information;
+  PositionSums sums;
+  for (std::size_t c = 0; c < 3; ++c)
+    if (const auto channel = fit_channel(profile, basis, c)) add_channel(profile, basis, c, *channel, fit, sums);
+  if (sums.degrees < 3 || !(fit.information > min_edge_information)) return fit;
+  fit.offset_px = sums.position_gradient / fit.information;
   // Of the blur, whatever the position is.
-  fit.blur_gradient -= fit.offset_px * position_and_blur;
-  fit.blur_information -= position_and_blur * position_and_blur / fit.information;
-  fit.residual_variance = squares / static_cast<float>(degrees);
+  fit.blur_gradient -= fit.offset_px * sums.position_and_blur;
+  fit.blur_information -= sums.position_and_blur * sums.position_and_blur / fit.information;
+  fit.residual_variance = sums.squares / static_cast<float>(sums.degrees);
   fit.converged = std::isfinite(fit.offset_px) && std::isfinite(fit.residual_variance);
   return fit;
 }
