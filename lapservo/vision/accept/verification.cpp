@@ -18,16 +18,6 @@ double squared(double x) {
   return x * x;
 }
 
-// Of the marker; at least a pixel.
-double length_in_image_px(const Scene& scene, const ShaftPose& pose, double azimuth_rad) {
-  const auto px = [&](double along_m) {
-    return scene.camera.raw_from_point(pose.camera_from_unrolled *
-                                       surface_point(scene.marker.radius_m(), azimuth_rad, along_m));
-  };
-  const double length_px = (px(scene.marker.length_m()) - px(0)).norm();
-  return std::isfinite(length_px) ? std::max(1.0, length_px) : 1.0;
-}
-
 // Without the RCM both ends are needed: they fix the depth, and with it everything else.
 bool shows_enough(const ColourAgreement& agreement, const FineFit& fit) {
   const int on_inner = fit.used[1] + fit.used[2];
@@ -83,9 +73,11 @@ ColourAgreement colour_agreement(const Scene& scene, const ShaftPose& pose) {
   const auto view = view_cylinder(pose.camera_from_unrolled, scene.marker.radius_m());
   if (!view) return {};
   const double length_m = scene.marker.length_m();
-  const double guard_m =
-      length_m * std::max(min_guard, blurred_px / length_in_image_px(scene, pose, view->facing_azimuth_rad));
   const Eigen::Vector3d axis = pose.camera_from_unrolled.rotation * Eigen::Vector3d::UnitZ();
+  const Eigen::Vector3d middle =
+      pose.camera_from_unrolled * surface_point(scene.marker.radius_m(), view->facing_azimuth_rad, length_m / 2);
+  const double px_per_m = (scene.camera.raw_with_jacobian(middle).d_px_d_point * axis).norm();
+  const double guard_m = std::max(min_guard * length_m, blurred_px / px_per_m);
   int total = 0, inside = 0, matching = 0, wrong = 0;
   for (int i = 0; i < azimuths; ++i) {
     const double azimuth_rad = visible_azimuth_rad(*view, reach, i, azimuths);
