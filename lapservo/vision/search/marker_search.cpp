@@ -53,7 +53,11 @@ Found try_start(const Scene& scene, const LightImage& light, const PoseUnknowns&
   const CoarseFit coarse = fitted_coarsely(scene, start, Rotation::unknown, budget);
   if (!coarse.shows_rotation()) return {};
   if (coarse.has_rival()) return refusal(Status::ambiguous, coarse.unknowns);
-  return follow(scene, light, coarse.unknowns, {}, {}, budget);
+  FineFit fit = fitted(scene, light, coarse.unknowns, {}, {}, budget);
+  if (!fit.converged)
+    if (const CoarseFit nearer = fitted_coarsely(scene, coarse.unknowns, Rotation::known, budget); nearer.found)
+      fit = fitted(scene, light, nearer.unknowns, {}, {}, budget);
+  return judged(scene, light, std::move(fit), budget);
 }
 
 // Two fits of one marker that are both ok: of what blood leaves both can't be sure.
@@ -83,11 +87,13 @@ InitialPoses starts_in(const SearchFrame& frame, bool through_rcm, const Blob& b
 
 Found follow(const Scene& scene, const LightImage& light, const PoseUnknowns& expected, const EdgeBlur& blur,
              const ExpectedProcessing& processing, WorkBudget& budget) {
-  FineFit fit = fitted(scene, light, expected, blur, processing, budget);
-  if (!fit.converged)
-    if (const CoarseFit coarse = fitted_coarsely(scene, expected, Rotation::known, budget); coarse.found)
-      fit = fitted(scene, light, coarse.unknowns, blur, processing, budget);
-  return judged(scene, light, std::move(fit), budget);
+  const auto fitted_from = [&](const PoseUnknowns& start) {
+    return judged(scene, light, fitted(scene, light, start, blur, processing, budget), budget);
+  };
+  Found near = fitted_from(expected);
+  if (near.fit || near.status == Status::marker_mismatch) return near;
+  const CoarseFit coarse = fitted_coarsely(scene, expected, Rotation::known, budget);
+  return coarse.found ? fitted_from(coarse.unknowns) : Found{};
 }
 
 Found follow_through_rcm(const Scene& scene, const LightImage& light, const FineFit& free,
@@ -102,7 +108,8 @@ Found follow_through_rcm(const Scene& scene, const LightImage& light, const Fine
   const Eigen::Vector2d tilt_rad = z.cross(axis).head<2>();  // the first two unknowns of a free pose
   if (!(tilt_rad.dot(free.covariance.topLeftCorner<2, 2>().inverse() * tilt_rad) < most_sigmas * most_sigmas))
     return {};
-  return follow(scene, light, start, free.blur, {false, free.bias_px, free.departure}, budget);
+  const ExpectedProcessing processing{false, free.bias_px, free.departure};
+  return judged(scene, light, fitted(scene, light, start, free.blur, processing, budget), budget);
 }
 
 // The starts of one blob, until one fits. Without the RCM they are rivals: all are tried then, in one frame.
@@ -231,7 +238,8 @@ bool MarkerSearch::fit_to_results(const SearchFrame& frame, WorkBudget& budget) 
   for (; !results_->empty(); results_->pop_back()) {
     if (!budget.allows(costs.fit_to_result())) return false;
     const PoseUnknowns start = agreement_->in_this_frame(frame.scene, results_->back(), budget);
-    const Found found = follow(frame.scene, frame.light, start, {}, {}, budget);
+    const Found found =
+        judged(frame.scene, frame.light, fitted(frame.scene, frame.light, start, {}, {}, budget), budget);
     if (!found.fit) continue;
     has_rivals_ |= candidate_ && are_rivals(*candidate_, *found.fit);
     if (!candidate_ || found.fit->misfit() < candidate_->misfit()) candidate_ = found.fit;
