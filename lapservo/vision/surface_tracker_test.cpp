@@ -158,6 +158,27 @@ TEST(SurfaceTracker, RemembersThatTheCameraSharpens) {
   }
 }
 
+TEST(SurfaceTracker, NoticesAtOnceThatTheCameraSharpens) {
+  constexpr std::size_t switched_on = 4;
+  const Rig rig = scenes::usual_rig();
+  effects::CameraEffects sharpened;
+  sharpened.sharpening = 0.9, sharpened.sharpening_px = 1.3;
+  SurfaceTracker following(rig, false), anew(rig, true);
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    following.forget();
+    const auto motion = slow_motion(rig, seed, 6);
+    for (std::size_t i = 0; i < motion.size(); ++i) {
+      const cv::Mat plain = scenes::render(rig, {motion[i]}, i);
+      const cv::Mat image = i < switched_on ? plain : effects::seen_through(sharpened, plain, rig.camera);
+      const Observation followed = following.track(image)[0], found = anew.track(image)[0];
+      ASSERT_EQ(followed.status, Status::ok);
+      EXPECT_LT(normalised_square(q_error(followed.rcm->q, found.rcm->q), found.rcm->covariance), 0.1) << "frame " << i;
+      EXPECT_LT(followed.sigma_tau_rad, 1.5 * found.sigma_tau_rad) << "frame " << i;
+    }
+  }
+}
+
 TEST(SurfaceTracker, FindsTheInstrumentAgainAfterItWasHidden) {
   const Rig rig = scenes::usual_rig();
   const cv::Mat hidden = scenes::render_nothing(rig, 2);

@@ -7,9 +7,8 @@
 namespace lapservo::internal {
 namespace {
 
-// Whether or not the frame's fit looked at the camera.
 LookSchedule schedule_after(const FineFit& fit, LookSchedule schedule) {
-  if (schedule.is_due())
+  if (fit.asked)
     schedule.looked(fit.processing, fit.processing_explained > 0);
   else
     schedule.passed();

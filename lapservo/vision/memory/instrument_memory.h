@@ -23,7 +23,7 @@ struct InstrumentMemory {
   CameraDeparture departure;
   bool among_others = false;  ///< Found::among_others
 
-  ExpectedProcessing expected_processing() const { return {looks.is_due(), bias_px, departure}; }
+  ExpectedProcessing expected_processing() const { return {looks.is_due(), bias_px, departure, blur.boundaries_px()}; }
   /// Where it is when it moves on as it did, for some steps at most.
   PoseUnknowns expected_pose(double at_s) const;
   /// By how much psi differs from there. Nullopt where no step is known, or without q.

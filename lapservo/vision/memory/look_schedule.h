@@ -8,20 +8,17 @@ namespace lapservo::internal {
 
 /// In which of a followed marker's frames to look at what the camera did to the picture (camera_look.h). A camera that
 /// processes its pictures is looked at in each frame, since what to take off depends on the frame. One that does not is
-/// looked at now and then. A full look that stays without an answer costs several times a tracked frame, and the next
-/// frame rarely differs: it is repeated after 1, 2, 4, ... frames.
+/// looked at now and then, and where the blur changes (ExpectedProcessing). A full look that stays without an answer
+/// costs several times a tracked frame, and the next frame rarely differs: it is repeated after 1, 2, 4, ... frames.
 class LookSchedule {
  public:
   bool is_due() const { return frames_left_ == 0; }
 
   /// `fully`: the look took more than a first guess.
   void looked(Processing answer, bool fully) {
-    if (answer == Processing::none) {
-      frames_left_ = after_none;
-    } else if (answer == Processing::unknown && fully) {
-      frames_left_ = pause_;
-      pause_ = std::min(2 * pause_, longest_pause);
-    }
+    const bool in_vain = answer == Processing::unknown && fully;
+    frames_left_ = answer == Processing::none ? after_none : in_vain ? pause_ : 0;
+    if (in_vain) pause_ = std::min(2 * pause_, longest_pause);
     if (answer != Processing::unknown) pause_ = 1;
   }
   void passed() { frames_left_ = std::max(0, frames_left_ - 1); }

@@ -27,6 +27,13 @@ TEST(LookSchedule, LooksNowAndThenAtACameraThatDoesNot) {
   EXPECT_EQ(looks_in(160, Processing::none, false), 10);
 }
 
+TEST(LookSchedule, GoesOnInEachFrameAfterALookThatWasNotDue) {
+  LookSchedule schedule;
+  schedule.looked(Processing::none, false);
+  schedule.looked(Processing::found, true);
+  EXPECT_TRUE(schedule.is_due());
+}
+
 TEST(LookSchedule, RepeatsAQuickLookUntilItAnswers) {
   EXPECT_EQ(looks_in(100, Processing::unknown, false), 100);
 }

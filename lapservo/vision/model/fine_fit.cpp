@@ -84,6 +84,7 @@ class Fitter {
   Change take_blur(const EdgeBlur& improved);
   std::optional<Change> refine(const Effort& effort);
   bool refine_until_settled(int least_passes);
+  bool is_blurred_otherwise(const ExpectedProcessing& expected) const;
   void take_processing_off(const ProcessedEdges& edges);
   std::array<double, 4> departure_px() const;
   void count_inliers();
@@ -157,8 +158,13 @@ bool Fitter::refine_until_settled(int least_passes) {
   return settled;
 }
 
+bool Fitter::is_blurred_otherwise(const ExpectedProcessing& expected) const {
+  return expected.blur_px && std::abs(fit_.blur.boundaries_px() / *expected.blur_px - 1) > fine_fit_limits.other_blur;
+}
+
 bool Fitter::see_camera(const ExpectedProcessing& expected) {
-  for (int i = 0; expected.ask; ++i) {
+  fit_.asked = expected.ask || is_blurred_otherwise(expected);
+  for (int i = 0; fit_.asked; ++i) {
     SeenCamera camera = look_at_camera(light_, pass_.all, located_with_.boundaries_px(), fit_.departure);
     fit_.processing = camera.evidence.processing;
     processed_ = std::move(camera.evidence.edges);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 
 #include "lapservo/vision/camera/camera_departure.h"
 #include "lapservo/vision/camera/picture_processing.h"
@@ -24,6 +25,7 @@ struct FineFitLimits {
   double settled_oblique_px2 = 0.3;  ///< of a blur's covariance, which moves boundaries by a twentieth of it in px
   double sharp_blur_px = 1.8;        ///< a blur below it may flicker where few sides are left
   double settled_sigmas = 0.01;      ///< a reweighting that moves the unknowns by less is the last
+  double other_blur = 0.05;          ///< a change of the mean blur from one frame to the next, a fraction of it
 };
 inline constexpr FineFitLimits fine_fit_limits;
 
@@ -41,6 +43,7 @@ struct FineFit {
   double inlier_rms_sigmas = 0;   ///< of the boundaries' residuals, print errors taken out, by noise and tolerated_px
   double off_probability = 0, p_false = 1, p_false_by_tolerance = 0;  ///< as PrintFit has them
   double psi_variance_by_tolerance = 0;         ///< of the covariance, what the rig's tolerance of the print adds
+  bool asked = false;                           ///< what the camera did to the picture
   Processing processing = Processing::unknown;  ///< as far as asked
   int processing_explained = 0;                 ///< how often ProcessingEvidence::explained
   int asked_for_departure = 0;                  ///< how often find_departure() was
@@ -58,13 +61,14 @@ struct FineFit {
 };
 
 /// Whether to ask what the camera did to the picture beyond its response (picture_processing.h), which costs a tenth of
-/// a tracked frame's time where it did nothing. It does the same in all frames: bias_px, an earlier frame's, is what a
-/// frame that can't tell is in doubt by. `departure` is what earlier frames showed of the
-/// camera.
+/// a tracked frame's time where it did nothing. bias_px, an earlier frame's, is what a frame that can't tell is in
+/// doubt by. `departure` is what earlier frames showed of the camera. A frame whose boundaries' mean blur is another
+/// than `blur_px` is asked in any case: the camera's sharpening may have been switched on.
 struct ExpectedProcessing {
   bool ask = true;
   std::array<double, 4> bias_px{};
   CameraDeparture departure = {};
+  std::optional<double> blur_px = {};
 };
 
 /// Fits the pose to all boundaries on all visible generatrices and to the shaft's sides, located to a fraction of a
