@@ -102,32 +102,20 @@ class Mixture {
   InplaceVector<Part, hypotheses> parts_;
 };
 
-// Solutions for a print as the rig says, exactly and but for its tolerance.
-struct AsTheRigSays {
-  PrintSolution exact, tolerated;
-};
-
-std::optional<AsTheRigSays> solved_as_the_rig_says(const PrintSums& sums, double tolerance_mm) {
-  const auto exact = solved_with_print(sums, {});
-  if (!exact) return std::nullopt;
-  AsTheRigSays out{*exact, *exact};
-  // The exact print's pose is where the measurements were taken.
-  if (tolerance_mm == 0) {
-    out.tolerated.step.setZero(), out.tolerated.print_mm.setZero();
-    return out;
-  }
-  const auto tolerated = solved_with_print(sums, {tolerance_mm});
-  if (!tolerated) return std::nullopt;
-  out.tolerated = *tolerated;
-  return out;
+// The exact print's pose is where the measurements were taken: steps of other prints go from there.
+std::optional<PrintSolution> solved_beside(const PrintSolution& exact, const PrintSums& sums, const PrintPrior& prior) {
+  auto solution = solved_with_print(sums, prior);
+  if (solution) solution->step -= exact.step;
+  return solution;
 }
 
-std::optional<Mixture> mixed(const PrintSums& sums, const PrintSolution& as_the_rig_says, const Hypotheses& all) {
+std::optional<Mixture> mixed(const PrintSums& sums, const PrintSolution& exact, const PrintSolution& as_the_rig_says,
+                             const Hypotheses& all) {
   Mixture mixture(static_cast<int>(as_the_rig_says.step.size()));
   mixture.add(as_the_rig_says, all[0].weight);
   for (std::size_t i = 1; i < all.size(); ++i) {
     if (all[i].weight < limits.min_weight) continue;
-    const auto off = solved_with_print(sums, all[i].prior);
+    const auto off = solved_beside(exact, sums, all[i].prior);
     if (!off) return std::nullopt;
     mixture.add(*off, all[i].weight);
   }
@@ -152,28 +140,30 @@ std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const Res
                                   double film_prior, const Marker& marker, bool is_known, const CommonErrors& errors) {
   const PrintSums sums = print_sums(measurements, lines, pose_unknowns, film_prior, errors);
   const double tolerance_mm = marker.tolerance_m / mm_in_m;
-  const auto as_the_rig_says = solved_as_the_rig_says(sums, tolerance_mm);
+  const auto exact = solved_with_print(sums, {});
+  if (!exact) return std::nullopt;
+  const auto as_the_rig_says = solved_beside(*exact, sums, {tolerance_mm});
   if (!as_the_rig_says) return std::nullopt;
   // Nothing, where the frame tells nothing of the print.
   const PrintInformation print = information_of(sums).value_or(PrintInformation{});
   const PrintInformation evidence = doubted(print, doubted_shapes_mm(errors.doubt, sums, marker));
   const Hypotheses all = weighted(prior_hypotheses(tolerance_mm, is_known || marker.bands_are_measured()), evidence);
-  const auto mixture = mixed(sums, as_the_rig_says->tolerated, all);
+  const auto mixture = mixed(sums, *exact, *as_the_rig_says, all);
   if (!mixture) return std::nullopt;
   const PrintSolution mean = mixture->mean();
   for (Measurement& m : measurements) m.residual_px -= m.row.dot(mean.step) + print_shift_px(m, mean.print_mm);
   const auto psi_variance = [psi = pose_unknowns - 1](const PrintSolution& solution) {
     return solution.covariance(psi, psi);
   };
-  const double tolerated_rad2 = psi_variance(as_the_rig_says->tolerated);
+  const double tolerated_rad2 = psi_variance(*as_the_rig_says);
   PrintFit fit;
   fit.step = mean.step;
-  fit.step_as_the_rig_says = as_the_rig_says->tolerated.step;
+  fit.step_as_the_rig_says = as_the_rig_says->step;
   fit.covariance = mean.covariance.topLeftCorner(pose_unknowns, pose_unknowns);
   fit.off_probability = off_probability(all);
   fit.p_false = mixture->p_false();
   fit.p_false_by_tolerance = p_false_of(0, tolerated_rad2);
-  fit.psi_variance_by_tolerance = tolerated_rad2 - psi_variance(as_the_rig_says->exact);
+  fit.psi_variance_by_tolerance = tolerated_rad2 - psi_variance(*exact);
   return fit;
 }
 

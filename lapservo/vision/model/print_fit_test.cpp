@@ -109,6 +109,21 @@ TEST(PrintFit, TheTolerancesShareOfPsisVarianceGrowsWithIt) {
   }
 }
 
+TEST(PrintFit, AToleranceOfNothingChangesNothing) {
+  for (std::uint64_t seed = 1; seed <= shots; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const Shot& shot = scenes::usual_shot(seed);
+    Marker marker = shot.rig.instruments[0].marker;
+    const PrintFit without = fit_of(shot, marker);
+    marker.tolerance_m = 1e-9;
+    const PrintFit with = fit_of(shot, marker);
+    EXPECT_LT(std::abs(with.step[psi] - without.step[psi]), 1e-6);
+    EXPECT_NEAR(with.covariance(psi, psi), without.covariance(psi, psi), 1e-3 * without.covariance(psi, psi));
+    EXPECT_NEAR(with.p_false, without.p_false, 1e-3 * without.p_false);
+    EXPECT_LT(with.psi_variance_by_tolerance, 1e-3 * with.covariance(psi, psi));
+  }
+}
+
 TEST(PrintFit, AnErrorIsFalseBeyondATenthOfARadian) {
   EXPECT_NEAR(p_false_of(0, 0.1 * 0.1), 0.3173, 1e-4);
   EXPECT_NEAR(p_false_of(0.1, 1e-8), 0.5, 1e-9);
