@@ -102,20 +102,12 @@ class Mixture {
   InplaceVector<Part, hypotheses> parts_;
 };
 
-// The exact print's pose is where the measurements were taken: steps of other prints go from there.
-std::optional<PrintSolution> solved_beside(const PrintSolution& exact, const PrintSums& sums, const PrintPrior& prior) {
-  auto solution = solved_with_print(sums, prior);
-  if (solution) solution->step -= exact.step;
-  return solution;
-}
-
-std::optional<Mixture> mixed(const PrintSums& sums, const PrintSolution& exact, const PrintSolution& as_the_rig_says,
-                             const Hypotheses& all) {
+std::optional<Mixture> mixed(const PrintSums& sums, const PrintSolution& as_the_rig_says, const Hypotheses& all) {
   Mixture mixture(static_cast<int>(as_the_rig_says.step.size()));
   mixture.add(as_the_rig_says, all[0].weight);
   for (std::size_t i = 1; i < all.size(); ++i) {
     if (all[i].weight < limits.min_weight) continue;
-    const auto off = solved_beside(exact, sums, all[i].prior);
+    const auto off = solved_with_print(sums, all[i].prior);
     if (!off) return std::nullopt;
     mixture.add(*off, all[i].weight);
   }
@@ -140,17 +132,17 @@ std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const Res
                                   double film_prior, const Marker& marker, bool is_known, const CommonErrors& errors) {
   const PrintSums sums = print_sums(measurements, lines, pose_unknowns, film_prior, errors);
   const double tolerance_mm = marker.tolerance_m / mm_in_m;
-  const auto exact = solved_with_print(sums, {});
-  if (!exact) return std::nullopt;
-  const auto as_the_rig_says = solved_beside(*exact, sums, {tolerance_mm});
-  if (!as_the_rig_says) return std::nullopt;
+  const auto as_the_rig_says = solved_with_print(sums, {tolerance_mm});
+  const auto exact = tolerance_mm > 0 ? solved_with_print(sums, {}) : as_the_rig_says;
+  if (!exact || !as_the_rig_says) return std::nullopt;
   // Nothing, where the frame tells nothing of the print.
   const PrintInformation print = information_of(sums).value_or(PrintInformation{});
   const PrintInformation evidence = doubted(print, doubted_shapes_mm(errors.doubt, sums, marker));
   const Hypotheses all = weighted(prior_hypotheses(tolerance_mm, is_known || marker.bands_are_measured()), evidence);
-  const auto mixture = mixed(sums, *exact, *as_the_rig_says, all);
+  const auto mixture = mixed(sums, *as_the_rig_says, all);
   if (!mixture) return std::nullopt;
-  const PrintSolution mean = mixture->mean();
+  PrintSolution mean = mixture->mean();
+  mean.step -= exact->step;  // whose pose is where the measurements were taken
   for (Measurement& m : measurements) m.residual_px -= m.row.dot(mean.step) + print_shift_px(m, mean.print_mm);
   const auto psi_variance = [psi = pose_unknowns - 1](const PrintSolution& solution) {
     return solution.covariance(psi, psi);
@@ -158,7 +150,7 @@ std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const Res
   const double tolerated_rad2 = psi_variance(*as_the_rig_says);
   PrintFit fit;
   fit.step = mean.step;
-  fit.step_as_the_rig_says = as_the_rig_says->step;
+  fit.step_as_the_rig_says = as_the_rig_says->step - exact->step;
   fit.covariance = mean.covariance.topLeftCorner(pose_unknowns, pose_unknowns);
   fit.off_probability = off_probability(all);
   fit.p_false = mixture->p_false();

@@ -260,9 +260,8 @@ CoarseFit fit_coarsely(const Scene& scene, PoseUnknowns start, Rotation rotation
   constexpr int steps_per_round = 4;
   CoarseFit fit;
   fit.unknowns = std::move(start);
-  bool rotation_known = rotation == Rotation::known;
-  const int rounds = rotation_known ? 1 : 2;
-  for (int round = 0; round < rounds; ++round) {
+  const int last = rotation == Rotation::known ? 0 : 1;
+  for (int round = 0; round <= last; ++round) {
     const auto view = view_cylinder(fit.unknowns.pose().camera_from_unrolled, scene.marker.radius_m());
     if (!view) return fit;
     const double narrowing = round == 0 ? 1 : 0.5;
@@ -270,15 +269,14 @@ CoarseFit fit_coarsely(const Scene& scene, PoseUnknowns start, Rotation rotation
     const auto surface = sample_surface(scene, fit.unknowns.pose(), *view, narrowing * coarse_fit_limits.along_reach);
     const auto boundaries = measure_boundaries(scene, fit.unknowns.pose(), surface);
     if (boundaries.size() < coarse_fit_limits.min_boundaries || sides.size() < coarse_fit_limits.min_sides) return fit;
-    if (!rotation_known && round == 1) {
+    if (round == 1) {
       const RotationSearch search = search_rotation(scene, surface);
       fit.unknowns = fit.unknowns.with_psi(search.psi_rad);
       fit.rotation_score = search.score;
       fit.rival_score = search.rival_score;
-      rotation_known = true;
     }
     for (int step = 0; step < steps_per_round; ++step) {
-      const auto next = stepped(scene, fit.unknowns, sides, boundaries, rotation_known);
+      const auto next = stepped(scene, fit.unknowns, sides, boundaries, round == last);
       if (!next) return fit;
       fit.unknowns = *next;
     }

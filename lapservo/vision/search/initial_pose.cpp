@@ -206,11 +206,8 @@ Ends find_ends(const Scene& scene, const Outline& outline) {
     const auto shares = shares_of(split);
     with_other_bands += shares && !has_band_shares(scene.marker, *shares);
   }
-  const auto of_two_or_more = [](std::vector<double>& values) -> std::optional<double> {
-    return values.size() < 2 ? std::nullopt : std::optional(median(values));
-  };
   constexpr int most_of_them = 7;
-  return {of_two_or_more(first), of_two_or_more(last), with_other_bands >= most_of_them};
+  return {agreed_end(first), agreed_end(last), with_other_bands >= most_of_them};
 }
 
 // Point of the axis behind a place on the centre line, from the width of the shaft there.

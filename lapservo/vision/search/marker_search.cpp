@@ -49,6 +49,11 @@ Found judged(const Scene& scene, const LightImage& light, FineFit fit, WorkBudge
   return status == Status::ok ? Found{status, std::move(fit), {}} : refusal(status, fit.unknowns);
 }
 
+Found fitted_from(const Scene& scene, const LightImage& light, const PoseUnknowns& start, const EdgeBlur& blur,
+                  const ExpectedProcessing& processing, WorkBudget& budget) {
+  return judged(scene, light, fitted(scene, light, start, blur, processing, budget), budget);
+}
+
 Found try_start(const Scene& scene, const LightImage& light, const PoseUnknowns& start, WorkBudget& budget) {
   const CoarseFit coarse = fitted_coarsely(scene, start, Rotation::unknown, budget);
   if (!coarse.shows_rotation()) return {};
@@ -73,13 +78,17 @@ double reach_px(const SearchFrame& frame) {
   return of_width * frame.scene.image.width_px;
 }
 
+double cost_of_starts(const SearchFrame& frame) {
+  return costs.starts_in_blob(!frame.scene.others.empty());
+}
+
 InitialPoses starts_in(const SearchFrame& frame, bool through_rcm, const Blob& blob, WorkBudget& budget) {
   InitialPoses starts;
   if (through_rcm)
     starts.poses = starts_through_rcm(frame.scene, blob, *frame.camera_from_rcm);
   else
     starts = initial_poses(frame.scene, blob);
-  budget.spend(starts.poses.empty() ? costs.no_starts : costs.starts_in_blob(!frame.scene.others.empty()));
+  budget.spend(starts.poses.empty() ? costs.no_starts : cost_of_starts(frame));
   return starts;
 }
 
@@ -87,13 +96,10 @@ InitialPoses starts_in(const SearchFrame& frame, bool through_rcm, const Blob& b
 
 Found follow(const Scene& scene, const LightImage& light, const PoseUnknowns& expected, const EdgeBlur& blur,
              const ExpectedProcessing& processing, WorkBudget& budget) {
-  const auto fitted_from = [&](const PoseUnknowns& start) {
-    return judged(scene, light, fitted(scene, light, start, blur, processing, budget), budget);
-  };
-  Found near = fitted_from(expected);
+  Found near = fitted_from(scene, light, expected, blur, processing, budget);
   if (near.fit || near.status == Status::marker_mismatch) return near;
   const CoarseFit coarse = fitted_coarsely(scene, expected, Rotation::known, budget);
-  return coarse.found ? fitted_from(coarse.unknowns) : Found{};
+  return coarse.found ? fitted_from(scene, light, coarse.unknowns, blur, processing, budget) : Found{};
 }
 
 Found follow_through_rcm(const Scene& scene, const LightImage& light, const FineFit& free,
@@ -108,8 +114,7 @@ Found follow_through_rcm(const Scene& scene, const LightImage& light, const Fine
   const Eigen::Vector2d tilt_rad = z.cross(axis).head<2>();  // the first two unknowns of a free pose
   if (!(tilt_rad.dot(free.covariance.topLeftCorner<2, 2>().inverse() * tilt_rad) < most_sigmas * most_sigmas))
     return {};
-  const ExpectedProcessing processing{false, free.bias_px, free.departure};
-  return judged(scene, light, fitted(scene, light, start, free.blur, processing, budget), budget);
+  return fitted_from(scene, light, start, free.blur, {false, free.bias_px, free.departure}, budget);
 }
 
 // The starts of one blob, until one fits. Without the RCM they are rivals: all are tried then, in one frame.
@@ -117,7 +122,7 @@ Found MarkerSearch::detect_in_blob(const SearchFrame& frame, bool through_rcm, c
                                    WorkBudget& budget) {
   Found best;
   const std::size_t first = walk.blobs.start();
-  if (!budget.allows(costs.starts_in_blob(!frame.scene.others.empty()) + costs.try_start())) {
+  if (!budget.allows(cost_of_starts(frame) + costs.try_start())) {
     walk.blobs.stop(blob, first);
     return best;
   }
@@ -238,8 +243,7 @@ bool MarkerSearch::fit_to_results(const SearchFrame& frame, WorkBudget& budget) 
   for (; !results_->empty(); results_->pop_back()) {
     if (!budget.allows(costs.fit_to_result())) return false;
     const PoseUnknowns start = agreement_->in_this_frame(frame.scene, results_->back(), budget);
-    const Found found =
-        judged(frame.scene, frame.light, fitted(frame.scene, frame.light, start, {}, {}, budget), budget);
+    const Found found = fitted_from(frame.scene, frame.light, start, {}, {}, budget);
     if (!found.fit) continue;
     has_rivals_ |= candidate_ && are_rivals(*candidate_, *found.fit);
     if (!candidate_ || found.fit->misfit() < candidate_->misfit()) candidate_ = found.fit;
@@ -292,8 +296,7 @@ Found MarkerSearch::look_with_rcm(const SearchFrame& frame, WorkBudget& budget) 
   const WorkBudget::Beyond step = budget.allowed();
   // Half the budget, or by turns what a start takes, is for what shows plainly.
   longs_turn_ = searches_long_ && !longs_turn_;
-  const double half = budget.left() / 2,
-               one_start = costs.starts_in_blob(!frame.scene.others.empty()) + costs.try_start();
+  const double half = budget.left() / 2, one_start = cost_of_starts(frame) + costs.try_start();
   const double share = !searches_long_ ? budget.left() : longs_turn_ ? half : std::max(half, one_start);
   Found plain = budget.share(share, longs_turn_ ? WorkBudget::Beyond::none : step,
                              [&](WorkBudget& part) { return detect(frame, true, plain_, part); });

@@ -214,10 +214,7 @@ Extent extent_of(const Scene& scene, const RaysFromRcm& rays, const Fan& fan, co
     if (lines[i].split.seen[0]) first.push_back(fan.beta_rad(lines[i].split.position[0]));
     if (lines[i].split.seen[3]) last.push_back(fan.beta_rad(lines[i].split.position[3]));
   }
-  const auto of_two_or_more = [](std::vector<double>& values) -> std::optional<double> {
-    return values.size() < 2 ? std::nullopt : std::optional(median(values));
-  };
-  Extent extent{fan.alpha_rad(sum / count), 0, of_two_or_more(first), of_two_or_more(last)};
+  Extent extent{fan.alpha_rad(sum / count), 0, agreed_end(first), agreed_end(last)};
   const Line& middle = lines[window.middle];
   const double from_rad = fan.beta_rad(middle.split.position[0]), to_rad = fan.beta_rad(middle.split.position[3]);
   extent.sine_of_beta = std::sin((from_rad + to_rad) / 2);
