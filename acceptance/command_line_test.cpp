@@ -318,7 +318,7 @@ TEST_F(CommandLine, ServoRunsAndReplays) {
   // It has not converged after half a second.
   EXPECT_EQ(run("servo --rig configs/paper.yaml --robot sim --duration 0.5"), 1);
   // It converges, and then ends in a hold.
-  EXPECT_EQ(run("servo --rig configs/paper.yaml --robot sim --duration 4.5 --seed 2 --hide 4,9"), 1);
+  EXPECT_EQ(run("servo --rig configs/paper.yaml --robot sim --duration 5.5 --seed 2 --hide 5,9"), 1);
   expect_in(output(), "within 1 px and 5 mrad from");
   expect_in(output(), "ended in a hold: marker_lost");
 }

@@ -20,6 +20,12 @@ enum class ControlAction {
 /// "track", "probe", "hold".
 std::string_view to_string(ControlAction action);
 
+/// A joint whose measured motion the image does not show.
+struct Unanswered {
+  Eigen::Index joint = 0;  ///< theta, phi, rho, psi
+  double slope = 0;        ///< the image's motion per measured motion: 0 at rest, below 0 the other way
+};
+
 /// The command of the coming period.
 struct ControlStep {
   ControlAction action = ControlAction::hold;
@@ -31,6 +37,7 @@ struct ControlStep {
   std::optional<Estimate> estimate;                 ///< the instrument now; given while holding too, when there is one
   Eigen::Vector4d error = Eigen::Vector4d::Zero();  ///< estimated features minus desired ones; zero without estimate
   double delay_s = 0;                               ///< estimated delay of the image
+  std::optional<Unanswered> unanswered{};           ///< with HoldReason::image_not_following
 };
 
 }  // namespace lapservo

@@ -122,6 +122,7 @@ ControllerConfig checked(const ControllerConfig& config) {
   require_positive("stale_after_s", config.stale_after_s);
   require_positive("max_image_age_s", config.max_image_age_s);
   require_positive("max_following_error", config.max_following_error);
+  require_positive("model_error", config.model_error);
   return config;
 }
 

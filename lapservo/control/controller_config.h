@@ -109,6 +109,9 @@ struct ControllerConfig {
   double min_singular_value = 0.01;  ///< of the scaled Jacobian: below it the controller holds
   double stale_after_s = 0.1;        ///< hold when no usable image arrived for so long
   double max_image_age_s = 0.6;      ///< at arrival, by its stamp
+  /// How wrong an element of the model's Jacobian may be, as a part of it: by so much the image may answer one joint's
+  /// motion with another's before the loop holds (image_not_following).
+  double model_error = 0.2;
   /// Hold when the arm is farther from its setpoint than this: theta_rad, phi_rad, rho_m, psi_rad.
   Eigen::Vector4d max_following_error{0.1, 0.1, 0.01, 0.4};
 };

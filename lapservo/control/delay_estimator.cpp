@@ -7,10 +7,16 @@
 #include <Eigen/LU>
 
 namespace lapservo::internal {
+namespace {
+
+constexpr double frames_alike = 4;  // whose errors are the same
+
+}  // namespace
 
 void DelayEstimator::add(double stamp_s, const Eigen::Vector4d& q_image, const Eigen::Matrix4d& covariance,
                          const JointHistory& history) {
-  if (history.size() == 0 || history.oldest_s() > stamp_s - step_s * (candidates - 1)) return;
+  constexpr double span_s = step_s * (candidates - 1);
+  if (history.size() == 0 || history.oldest_s() > stamp_s - span_s) return;
   const Eigen::Matrix4d noise = covariance + Eigen::Matrix4d(config_.measured_sigma.cwiseAbs2().asDiagonal());
   const Eigen::Matrix4d information = noise.inverse();
   const double interval_s = started_ ? std::max(0.0, stamp_s - last_stamp_s_) : 0.0;
@@ -24,6 +30,11 @@ void DelayEstimator::add(double stamp_s, const Eigen::Vector4d& q_image, const E
     candidate.mean += fraction * before;
     candidate.squares = kept * candidate.squares + (1 - fraction) * before.dot(information * before);
   }
+  const Eigen::Vector4d moved = q_image - mean_;
+  mean_ += fraction * moved;
+  squares_ = kept * squares_ + (1 - fraction) * moved.dot(information * moved);
+  const Eigen::Vector4d rate = (*history.at(stamp_s) - *history.at(stamp_s - span_s)) / span_s;
+  information_per_s2_ = kept * information_per_s2_ + (1 - fraction) * rate.dot(information * rate);
   weight_ = kept * weight_ + 1;
   since_ += 1;
   seen_s_ += interval_s;
@@ -44,11 +55,20 @@ std::optional<DelayEstimate> DelayEstimator::estimate() const {
   const double delay_s = std::clamp(step_s * static_cast<double>(middle) + shift_s, 0.0, step_s * (candidates - 1));
   // A sum of squares grows by 1 at one sigma. A residual that the measured joints do not explain counts as noise that
   // persists over several frames.
-  constexpr double frames_alike = 4;
   const double misfit = std::max(1.0, lowest->squares / (4 * weight_));
   const double sigma_s = std::sqrt(2 / curvature * misfit * frames_alike);
   if (!(sigma_s <= config_.max_sigma_s)) return std::nullopt;
   return DelayEstimate{delay_s, sigma_s};
+}
+
+bool DelayEstimator::is_contradicted() const {
+  constexpr double times = 5, min_time_s = 5, unexplained = 0.5, misfit = 9;
+  const double expected_sigma_s = std::sqrt(frames_alike / information_per_s2_);
+  if (!(seen_s_ > min_time_s && times * expected_sigma_s < config_.max_sigma_s)) return false;
+  const auto lowest = std::min_element(grid_.begin(), grid_.end(),
+                                       [](const Candidate& a, const Candidate& b) { return a.squares < b.squares; });
+  const bool at_end = lowest + 1 == grid_.end();
+  return lowest->squares > misfit * 4 * weight_ && (at_end || lowest->squares > unexplained * squares_);
 }
 
 }  // namespace lapservo::internal

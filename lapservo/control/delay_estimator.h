@@ -38,6 +38,9 @@ class DelayEstimator {
   /// The image stamped t shows the joints at t - delay.
   std::optional<DelayEstimate> estimate() const;
 
+  /// No delay makes images and joints agree, although the joints' motion would determine it several times over.
+  bool is_contradicted() const;
+
  private:
   struct Candidate {
     Eigen::Vector4d mean = Eigen::Vector4d::Zero();  ///< of q_image - q_joint
@@ -47,8 +50,11 @@ class DelayEstimator {
   std::array<Candidate, candidates> grid_;
   double last_stamp_s_ = 0;
   double seen_s_ = 0;
-  double weight_ = 0;  ///< number of frames, forgotten likewise
-  double since_ = 0;   ///< frames since the last interruption
+  double weight_ = 0;                               ///< number of frames, forgotten likewise
+  double since_ = 0;                                ///< frames since the last interruption
+  Eigen::Vector4d mean_ = Eigen::Vector4d::Zero();  ///< of q_image
+  double squares_ = 0;                              ///< of q_image less its mean
+  double information_per_s2_ = 0;                   ///< that the joints' motion gives of a delay, forgotten likewise
   bool started_ = false;
 };
 

@@ -42,7 +42,8 @@ class FusedEstimator : public Estimator {
     const auto measured = history.at(image.time_s - observer_.delay_s());
     if (image.q && measured && std::abs(wrap_pi((*image.q)[3] - (*measured)[3])) > max_psi_offset_rad_)
       return HoldReason::psi_contradicted;
-    return reason_of(observer_.update(model_, history, image));
+    const HoldReason reason = reason_of(observer_.update(model_, history, image));
+    return observer_.delay_is_contradicted() ? HoldReason::delay_not_found : reason;
   }
   std::optional<Estimate> at(double time_s, const Eigen::Vector4d& q_joint) const override {
     return observer_.estimate(model_, q_joint, time_s);
@@ -110,6 +111,10 @@ class LatestImageEstimator : public Estimator {
 }  // namespace
 
 void Estimator::set_model(const FeatureModel&) {}
+
+std::optional<Unanswered> Estimator::unanswered() const {
+  return std::nullopt;
+}
 
 std::optional<Eigen::Vector4d> Estimator::probing_velocity(double) const {
   return std::nullopt;

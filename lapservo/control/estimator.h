@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 
+#include "lapservo/control/control_step.h"
 #include "lapservo/control/controller_config.h"
 #include "lapservo/control/feature_model.h"
 #include "lapservo/control/hold_reason.h"
@@ -31,6 +32,9 @@ class Estimator {
   virtual double delay_s() const = 0;
   /// False while it is a first guess that motion will improve.
   virtual bool delay_is_known() const { return true; }
+
+  /// The joint that a probing motion moved and no image showed, with HoldReason::image_not_following.
+  virtual std::optional<Unanswered> unanswered() const;
 
   /// Another camera_from_rcm: the estimates of delay and backlash stay, the next image gives the instrument's place.
   virtual void set_model(const FeatureModel& model);

@@ -6,7 +6,7 @@ namespace lapservo {
 using namespace internal;
 namespace {
 
-constexpr Words<HoldReason, 19> reason_words{{{HoldReason::none, "none"},
+constexpr Words<HoldReason, 22> reason_words{{{HoldReason::none, "none"},
                                               {HoldReason::no_image_yet, "no_image_yet"},
                                               {HoldReason::marker_lost, "marker_lost"},
                                               {HoldReason::stale_image, "stale_image"},
@@ -21,6 +21,9 @@ constexpr Words<HoldReason, 19> reason_words{{{HoldReason::none, "none"},
                                               {HoldReason::not_modelled, "not_modelled"},
                                               {HoldReason::singular, "singular"},
                                               {HoldReason::not_following, "not_following"},
+                                              {HoldReason::image_not_following, "image_not_following"},
+                                              {HoldReason::error_grows, "error_grows"},
+                                              {HoldReason::delay_not_found, "delay_not_found"},
                                               {HoldReason::not_learnt, "not_learnt"},
                                               {HoldReason::bad_time, "bad_time"},
                                               {HoldReason::non_finite, "non_finite"},

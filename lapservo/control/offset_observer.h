@@ -58,6 +58,8 @@ class OffsetObserver {
   double delay_s() const { return delay_s_; }
   /// Given, or estimated once.
   bool delay_is_known() const { return config_.delay_s || delay_seen_; }
+  /// Ample motion did not give it.
+  bool delay_is_contradicted() const { return !delay_is_known() && delay_estimator_.is_contradicted(); }
   const Eigen::Vector4d& offset() const { return offset_; }
   /// Full backlash between measured joints and instrument, joint by joint, as far as it has been learnt.
   const Eigen::Vector4d& backlash() const { return backlash_; }

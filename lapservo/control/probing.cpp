@@ -72,4 +72,41 @@ std::optional<ProbedModel> ProbingFit::solve() const {
   return model;
 }
 
+// The answer to one joint gives the delay of the images.
+void ProbingResponse::begin(Eigen::Index joint, const ImageMeasurement& image, const JointHistory& history) {
+  constexpr double unsure_s = 0.1;
+  const bool first = joint_ < 0;
+  const double longest_s = answered_ ? std::min(longest_s_, delay_s_ + unsure_s) : longest_s_;
+  *this = ProbingResponse(path_, longest_s);
+  joint_ = joint;
+  waits_ = !first;
+  begun_s_ = image.time_s;
+  q_first_ = (*history.newest())[joint];
+  features_ = image.features;
+}
+
+void ProbingResponse::add(Eigen::Index joint, const ImageMeasurement& image, const JointHistory& history) {
+  constexpr double plain = 6;        // standard deviations
+  constexpr double settled_s = 0.1;  // an arm that is sent to rest
+  if (joint != joint_) begin(joint, image, history);
+  waits_ = waits_ && image.time_s - begun_s_ < longest_s_ + settled_s;
+  if (!history.at(image.time_s - longest_s_) || waits_) return;
+  const Eigen::Array4d sigma = image.covariance.diagonal().array().sqrt();
+  const Eigen::Array4d y = feature_error(image.features, features_).array() / sigma;
+  count_ += 1;
+  plainest_ = 0;
+  for (std::size_t i = 0; i < candidates; ++i) {
+    const double x = (*history.at(image.time_s - delay_s(i)))[joint] - q_first_;
+    Sums& sum = sums_[i];
+    sum.x += x, sum.xx += x * x, sum.y += y, sum.xy += x * y;
+    const double squares = sum.xx - sum.x * sum.x / count_;
+    const Eigen::Array4d product = sum.xy - sum.x * sum.y / count_;
+    if (!(count_ > 2 && squares > 0)) continue;
+    const double found = product.abs().maxCoeff() / std::sqrt(squares);
+    if (found > plainest_) plainest_ = found, delay_s_ = delay_s(i);
+  }
+  answered_ = answered_ || plainest_ > plain;
+  unanswered_ = !answered_ && std::abs((*history.newest())[joint] - q_first_) > path_[joint];
+}
+
 }  // namespace lapservo::internal

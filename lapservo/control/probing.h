@@ -9,6 +9,7 @@
 #include "lapservo/control/affine_fit.h"
 #include "lapservo/control/controller_config.h"
 #include "lapservo/control/feature_model.h"
+#include "lapservo/control/image_measurement.h"
 #include "lapservo/control/joint_history.h"
 #include "lapservo/control/motion_limits.h"
 
@@ -47,6 +48,7 @@ class ProbingFit {
  public:
   static constexpr double step_s = 0.01;
   static constexpr std::size_t candidates = 31;  ///< 0 to 300 ms
+  static constexpr double longest_s = step_s * (candidates - 1);
 
   /// With a known delay, only that one is fitted.
   ProbingFit(const Scales& scales, std::optional<double> delay_s) : scales_(scales), known_delay_s_(delay_s) {}
@@ -68,6 +70,39 @@ class ProbingFit {
   Eigen::Vector4d first_features_ = Eigen::Vector4d::Zero();
   Eigen::Vector4d first_ends_px_ = Eigen::Vector4d::Zero();
   std::array<AffineFit, candidates> fits_;
+};
+
+/// Whether the image moves with the joint that is probed, whatever it does there: some feature's regression on the
+/// joint, at some delay, is plain beside the images' noise.
+class ProbingResponse {
+ public:
+  /// `path`: of each joint, after which the image has to have moved; `longest_delay_s`: of the images.
+  ProbingResponse(const Eigen::Vector4d& path, double longest_delay_s) : path_(path), longest_s_(longest_delay_s) {}
+
+  /// An image while `joint` is probed.
+  void add(Eigen::Index joint, const ImageMeasurement& image, const JointHistory& history);
+  /// The next image may still show the joint before.
+  bool waits(Eigen::Index joint) const { return joint == joint_ && waits_; }
+  bool answers(Eigen::Index joint) const { return joint == joint_ && answered_; }
+  bool is_unanswered() const { return unanswered_; }
+
+ private:
+  static constexpr std::size_t candidates = 7;  ///< delays from 0 to 300 ms
+  struct Sums {
+    double x = 0, xx = 0;
+    Eigen::Array4d y = Eigen::Array4d::Zero(), xy = Eigen::Array4d::Zero();
+  };
+  double delay_s(std::size_t candidate) const { return longest_s_ * static_cast<double>(candidate) / (candidates - 1); }
+  void begin(Eigen::Index joint, const ImageMeasurement& image, const JointHistory& history);
+
+  Eigen::Vector4d path_;
+  double longest_s_;
+  Eigen::Index joint_ = -1;
+  double begun_s_ = 0, q_first_ = 0, count_ = 0;
+  Eigen::Vector4d features_ = Eigen::Vector4d::Zero();
+  std::array<Sums, candidates> sums_;
+  double plainest_ = 0, delay_s_ = 0;  ///< of the regressions: in standard deviations, and at which delay
+  bool waits_ = false, answered_ = false, unanswered_ = false;
 };
 
 }  // namespace lapservo::internal

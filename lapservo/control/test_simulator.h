@@ -54,6 +54,8 @@ struct Flaws {
   Eigen::Vector4d offset = Eigen::Vector4d::Zero();    ///< true joints minus measured joints
   Eigen::Vector4d backlash = Eigen::Vector4d::Zero();  ///< full backlash, joint by joint
   double lag_s = 0;                                    ///< of the arm, first order
+  double faulty_s = 0;                                 ///< from when on `answer` holds
+  Eigen::Vector4d answer = Eigen::Vector4d::Ones();    ///< the instrument's motion per motion of the motors
   Eigen::Vector4d resolution{1e-5, 1e-5, 2e-6, 1e-4};  ///< of the measured joints
   Eigen::Vector4d noise{4e-4, 0.15, 0.15, 0.15};       ///< of the image
   long frame_every = 1;                                ///< control periods a frame
@@ -78,12 +80,12 @@ struct Moment {
 class TestSimulator {
  public:
   TestSimulator(const TestRig& rig, const Flaws& flaws, const Eigen::Vector4d& q_measured, std::uint64_t seed)
-      : rig_(rig), flaws_(flaws), random_(seed), motor_(q_measured), q_driven_(q_measured) {}
+      : rig_(rig), flaws_(flaws), random_(seed), motor_(q_measured), q_driven_(q_measured), q_instrument_(q_measured) {}
 
   Eigen::Vector4d q_measured() const {
     return (motor_.cwiseQuotient(flaws_.resolution)).array().round().matrix().cwiseProduct(flaws_.resolution);
   }
-  Eigen::Vector4d q_true() const { return q_driven_ + flaws_.offset; }
+  Eigen::Vector4d q_true() const { return q_instrument_ + flaws_.offset; }
 
   std::vector<Moment> run(VisualController& controller, const Trajectory& trajectory, double duration_s) {
     std::vector<Moment> moments;
@@ -131,7 +133,10 @@ class TestSimulator {
       const Eigen::Vector4d setpoint = controller.path().at(from_s + (to_s - from_s) * i / parts).position;
       const double fraction = flaws_.lag_s > 0 ? -std::expm1(-(to_s - from_s) / parts / flaws_.lag_s) : 1.0;
       motor_ += fraction * (setpoint - motor_);
+      const Eigen::Vector4d before = q_driven_;
       q_driven_ = q_driven_.cwiseMax(motor_ - flaws_.backlash / 2).cwiseMin(motor_ + flaws_.backlash / 2);
+      const Eigen::Vector4d answer = from_s < flaws_.faulty_s ? Eigen::Vector4d::Ones() : flaws_.answer;
+      q_instrument_ += answer.cwiseProduct(q_driven_ - before);
     }
     moved_s_ = to_s;
   }
@@ -139,7 +144,7 @@ class TestSimulator {
   TestRig rig_;
   Flaws flaws_;
   Random random_;
-  Eigen::Vector4d motor_, q_driven_;
+  Eigen::Vector4d motor_, q_driven_, q_instrument_;
   std::deque<ImageMeasurement> on_the_way_;
   double start_s_ = 0, moved_s_ = 0;
 };

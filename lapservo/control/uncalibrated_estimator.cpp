@@ -2,6 +2,9 @@
 
 #include <algorithm>
 
+#include "lapservo/control/image_response.h"
+#include "lapservo/core/angles.h"
+
 namespace lapservo::internal {
 namespace {
 
@@ -12,17 +15,29 @@ double beyond_px(const ImageWindow& window, const Eigen::Vector4d& ends_px) {
                    v.maxCoeff() - window.v_max_px});
 }
 
+// 4 when all have been probed.
+Eigen::Index joint_at(const ProbingConfig& config, double probed_s) {
+  return std::min<Eigen::Index>(4, static_cast<Eigen::Index>(probed_s / config.joint_time_s));
+}
+
 }  // namespace
 
 HoldReason UncalibratedEstimator::update(const ImageMeasurement& image, const JointHistory& history) {
   if (auto* learnt = std::get_if<Learnt>(&state_)) return follow(*learnt, image, history);
   if (std::holds_alternative<Waiting>(state_))
-    state_ = Probing{ProbingMotion(config_.probing, config_.limits, *history.newest(), side_),
-                     ProbingFit(config_.scales, config_.observer.delay_s)};
+    state_ = Probing{
+        ProbingMotion(config_.probing, config_.limits, *history.newest(), side_),
+        ProbingFit(config_.scales, config_.observer.delay_s),
+        ProbingResponse(ImageResponse::longest_path(), config_.observer.delay_s.value_or(ProbingFit::longest_s))};
   return learn(std::get<Probing>(state_), image, history);
 }
 
 HoldReason UncalibratedEstimator::learn(Probing& probing, const ImageMeasurement& image, const JointHistory& history) {
+  unanswered_.reset();
+  if (!is_answered(probing, image, history)) {
+    state_ = Waiting{};
+    return HoldReason::image_not_following;
+  }
   if (config_.window) stay_inside(probing, *config_.window, image.ends_px);
   probing.fit.add(image.time_s, image.features, image.ends_px, history);
   if (probing.probed_s < probing.motion.duration_s()) return HoldReason::none;
@@ -42,8 +57,9 @@ HoldReason UncalibratedEstimator::learn(Probing& probing, const ImageMeasurement
 void UncalibratedEstimator::stay_inside(Probing& probing, const ImageWindow& window, const Eigen::Vector4d& ends_px) {
   constexpr double noise_px = 1;
   const double beyond = beyond_px(window, ends_px), back_s = probing.motion.way_back_s(probing.probed_s);
-  const auto joint = static_cast<Eigen::Index>(probing.probed_s / config_.probing.joint_time_s);
-  if (joint != probing.joint) probing.beyond_at_first_px = beyond;
+  const Eigen::Index joint = joint_at(config_.probing, probing.probed_s);
+  if (joint > 3) return;
+  if (joint != probing.joint || probing.response.waits(joint)) probing.beyond_at_first_px = beyond;
   probing.joint = joint;
   if (back_s == probing.probed_s || beyond < probing.beyond_at_first_px + noise_px) return;
   side_[joint] = -side_[joint];
@@ -69,11 +85,33 @@ double UncalibratedEstimator::delay_s() const {
 
 std::optional<Eigen::Vector4d> UncalibratedEstimator::probing_velocity(double time_s) const {
   const auto* probing = std::get_if<Probing>(&state_);
-  return probing ? std::optional(probing->motion.velocity(probing->probed_s + time_s)) : std::nullopt;
+  if (!probing) return std::nullopt;
+  return probing->pace * probing->motion.velocity(probing->probed_s + probing->pace * time_s);
+}
+
+// The largest speed is that of a joint that no image has answered.
+double UncalibratedEstimator::pace_of(const Probing& probing) const {
+  const Eigen::Index joint = joint_at(config_.probing, probing.probed_s);
+  if (joint > 3 || probing.response.answers(joint)) return 1;
+  if (probing.response.waits(joint)) return 0;
+  const double largest = config_.probing.distance[joint] * pi / config_.probing.joint_time_s;
+  return std::min(1.0, ImageResponse::unconfirmed_rate(config_.limits)[joint] / largest);
 }
 
 void UncalibratedEstimator::advance_probing(double time_s) {
-  if (auto* probing = std::get_if<Probing>(&state_)) probing->probed_s += time_s;
+  constexpr double faster_per_s = 10;
+  auto* probing = std::get_if<Probing>(&state_);
+  if (!probing) return;
+  probing->probed_s += probing->pace * time_s;
+  probing->pace = std::min(probing->pace + faster_per_s * time_s, pace_of(*probing));
+}
+
+bool UncalibratedEstimator::is_answered(Probing& probing, const ImageMeasurement& image, const JointHistory& history) {
+  const Eigen::Index joint = joint_at(config_.probing, probing.probed_s);
+  if (joint > 3) return true;
+  probing.response.add(joint, image, history);
+  if (probing.response.is_unanswered()) unanswered_ = Unanswered{joint, 0};
+  return !unanswered_;
 }
 
 std::optional<Estimate> UncalibratedEstimator::at(double, const Eigen::Vector4d& q_joint) const {

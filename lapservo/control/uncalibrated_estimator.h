@@ -18,6 +18,7 @@ class UncalibratedEstimator : public Estimator {
   double delay_s() const override;
   std::optional<Eigen::Vector4d> probing_velocity(double time_s) const override;
   void advance_probing(double time_s) override;
+  std::optional<Unanswered> unanswered() const override { return unanswered_; }
 
  private:
   /// For an image, by which the probing motion begins.
@@ -25,7 +26,9 @@ class UncalibratedEstimator : public Estimator {
   struct Probing {
     ProbingMotion motion;
     ProbingFit fit;
+    ProbingResponse response;
     double probed_s = 0;
+    double pace = 0;                ///< of the motion: slower until an image shows the joint's
     Eigen::Index joint = -1;        ///< that is probed
     double beyond_at_first_px = 0;  ///< of the window, in the first image of that joint's motion
   };
@@ -37,11 +40,14 @@ class UncalibratedEstimator : public Estimator {
 
   HoldReason learn(Probing& probing, const ImageMeasurement& image, const JointHistory& history);
   void stay_inside(Probing& probing, const ImageWindow& window, const Eigen::Vector4d& ends_px);
+  bool is_answered(Probing& probing, const ImageMeasurement& image, const JointHistory& history);
+  double pace_of(const Probing& probing) const;
   HoldReason follow(Learnt& learnt, const ImageMeasurement& image, const JointHistory& history) const;
 
   ControllerConfig config_;
   Eigen::Vector4d side_ = Eigen::Vector4d::Ones();  ///< to which the joints are probed
   std::variant<Waiting, Probing, Learnt> state_;
+  std::optional<Unanswered> unanswered_;
 };
 
 }  // namespace lapservo::internal

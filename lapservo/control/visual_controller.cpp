@@ -39,6 +39,8 @@ VisualController::VisualController(const ControllerConfig& config, FeatureModel 
       arm_response_(config.scales),
       following_error_limit_(config.limits),
       frozen_image_(config.scales),
+      image_response_(config),
+      error_growth_(config.scales),
       wild_joints_(config.limits.rate),
       path_(config.limits.acceleration) {}
 
@@ -59,8 +61,15 @@ void VisualController::start_over(double time_s, const Eigen::Vector4d& q_joint)
   now_s_ = time_s;
 }
 
+void VisualController::restart_tests() {
+  image_response_.restart();
+  error_growth_.restart();
+  until_start_ = HoldReason::none;
+}
+
 void VisualController::resume(const FeatureModel& model) {
   resume();
+  image_response_.interrupt();
   estimator_->set_model(model);
   image_reason_ = HoldReason::no_image_yet;
 }
@@ -78,6 +87,8 @@ ControlStep VisualController::step(double time_s, const Eigen::Vector4d& q_joint
   }
   if (step.reason == HoldReason::none) step.reason = image_reason_;
   if (step.reason == HoldReason::none && !(image_s_ >= needed_since_s_)) step.reason = HoldReason::stale_image;
+  if (follows_ && step.reason == HoldReason::none && suspended_ == HoldReason::none) step.reason = until_start_;
+  if (step.reason == HoldReason::image_not_following) step.unanswered = image_response_.unanswered();
 
   const Law law = decide(step.reason, step.estimate, desired);
   step.reason = law.reason;
@@ -95,6 +106,7 @@ ControlStep VisualController::step(double time_s, const Eigen::Vector4d& q_joint
   step.setpoint = path_.end();
   if (step.estimate && all_finite(desired)) step.error = feature_error(step.estimate->features, desired.features);
   step.delay_s = delay_s();
+  watch_error(desired, step);
   return step;
 }
 
@@ -119,6 +131,7 @@ HoldReason VisualController::read(double time_s, const Eigen::Vector4d& q_joint,
     arm_response_.restart();
     following_error_limit_.restart();
     frozen_image_ = FrozenImage(config_.scales);
+    image_response_.interrupt();
     image_reason_ = HoldReason::wild_joints;  // until an image gives the instrument's place
   }
   if (!follows_) path_.move_to(time_s, q_joint);
@@ -156,9 +169,29 @@ HoldReason VisualController::update(const ImageMeasurement& image) {
   const FrozenImage::Verdict verdict = frozen_image_.add(image, history_);
   if (verdict == FrozenImage::Verdict::frozen) return HoldReason::frozen_image;
   if (verdict == FrozenImage::Verdict::again) return image_reason_;
+  const bool probed = estimator_->probing_velocity(0).has_value();
   const HoldReason reason = suspended ? HoldReason::none : estimator_->update(image, history_);
+  // A probing motion ends when the image has shown each joint's.
+  if (probed && reason == HoldReason::none && !estimator_->probing_velocity(0)) image_response_.confirm_all();
   if (reason == HoldReason::none) usable_s_ = now_s_;
+  if (reason == HoldReason::delay_not_found) until_start_ = reason;
+  if (suspended) {
+    image_response_.interrupt();
+  } else if (reason != HoldReason::outlier) {
+    compare_motion(image);
+  }
   return reason;
+}
+
+void VisualController::compare_motion(const ImageMeasurement& image) {
+  if (const auto found = estimator_->unanswered()) image_response_.set_unanswered(*found);
+  if (const auto now = estimator_->at(now_s_, *history_.newest())) image_response_.add(image, now->jacobian, history_);
+  if (image_response_.unanswered()) until_start_ = HoldReason::image_not_following;
+}
+
+void VisualController::watch_error(const DesiredFeatures& desired, const ControlStep& step) {
+  if (!follows_ || step.action != ControlAction::track || !step.estimate) return error_growth_.restart();
+  if (error_growth_.add(desired, step.error)) until_start_ = HoldReason::error_grows;
 }
 
 void VisualController::watch_image_age() {
@@ -181,6 +214,7 @@ VisualController::Law VisualController::probing_law(const Eigen::Vector4d& veloc
   Law law;
   law.action = ControlAction::probe;
   law.velocity = velocity;
+  law.rate = config_.limits.rate;
   law.weight = config_.scales.joints.cwiseAbs2().cwiseInverse().asDiagonal();
   return law;
 }
@@ -188,6 +222,7 @@ VisualController::Law VisualController::probing_law(const Eigen::Vector4d& veloc
 VisualController::Law VisualController::tracking_law(const std::optional<Estimate>& estimate,
                                                      const DesiredFeatures& desired) const {
   Law law;
+  law.rate = image_response_.rate();
   if (!estimate) {
     law.reason = HoldReason::not_modelled;
     return law;
@@ -218,7 +253,7 @@ VisualController::Law VisualController::tracking_law(const std::optional<Estimat
 /// The law's velocity, as far as the limits allow it.
 void VisualController::limit(const Law& law, const Eigen::Vector4d& q_joint, ControlStep& step) const {
   const MotionState motion = path_.at(now_s_);
-  const Eigen::Vector4d slowed = slow_to_rate(law.velocity);
+  const Eigen::Vector4d slowed = slow_to_rate(law.velocity, law.rate);
   Eigen::Vector4d wanted = slowed;
   std::optional<EndPoints> ends;
   if (step.estimate) {
@@ -256,8 +291,8 @@ Eigen::Matrix4d VisualController::deviation_weight(const Eigen::Matrix4d& jacobi
 }
 
 /// Slower along the same line, so that a far goal is approached straight.
-Eigen::Vector4d VisualController::slow_to_rate(const Eigen::Vector4d& velocity) const {
-  const double times = velocity.cwiseAbs().cwiseQuotient(config_.limits.rate).maxCoeff();
+Eigen::Vector4d VisualController::slow_to_rate(const Eigen::Vector4d& velocity, const Eigen::Vector4d& rate) {
+  const double times = velocity.cwiseAbs().cwiseQuotient(rate).maxCoeff();
   return times > 1 ? Eigen::Vector4d(velocity / times) : velocity;
 }
 

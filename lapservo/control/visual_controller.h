@@ -11,12 +11,14 @@
 #include "lapservo/control/arm_response.h"
 #include "lapservo/control/control_step.h"
 #include "lapservo/control/controller_config.h"
+#include "lapservo/control/error_growth.h"
 #include "lapservo/control/estimator.h"
 #include "lapservo/control/feature_model.h"
 #include "lapservo/control/following_error_limit.h"
 #include "lapservo/control/frozen_image.h"
 #include "lapservo/control/hold_reason.h"
 #include "lapservo/control/image_measurement.h"
+#include "lapservo/control/image_response.h"
 #include "lapservo/control/joint_history.h"
 #include "lapservo/control/trajectory.h"
 #include "lapservo/control/wild_joints.h"
@@ -43,6 +45,9 @@ class VisualController {
 
   /// Images of before that time move nothing: the arm may be elsewhere since.
   void need_image_since(double time_s) { needed_since_s_ = time_s; }
+
+  /// The operator says start: what held until then counts no more, and the image has to show each joint's motion anew.
+  void restart_tests();
 
   /// From the next step on the model does not count: nothing is estimated, and the arm holds for that reason.
   void suspend(HoldReason reason) { suspended_ = reason; }
@@ -76,6 +81,7 @@ class VisualController {
     HoldReason reason = HoldReason::none;
     ControlAction action = ControlAction::track;
     Eigen::Vector4d velocity = Eigen::Vector4d::Zero();
+    Eigen::Vector4d rate = Eigen::Vector4d::Ones();          ///< beyond which it is slowed
     Eigen::Vector4d feed_forward = Eigen::Vector4d::Zero();  ///< the part of it that the desired motion alone requires
     Eigen::Matrix4d weight = Eigen::Matrix4d::Identity();    ///< of deviations from it
   };
@@ -84,14 +90,16 @@ class VisualController {
                   std::span<const JointReading> readings);
   void remember(double time_s, const Eigen::Vector4d& q_joint, std::span<const JointReading> readings);
   HoldReason update(const ImageMeasurement& image);
+  void compare_motion(const ImageMeasurement& image);
   void watch_image_age();
+  void watch_error(const DesiredFeatures& desired, const ControlStep& step);
   Law decide(HoldReason reason, const std::optional<Estimate>& estimate, const DesiredFeatures& desired) const;
   Law probing_law(const Eigen::Vector4d& velocity) const;
   Law tracking_law(const std::optional<Estimate>& estimate, const DesiredFeatures& desired) const;
   void limit(const Law& law, const Eigen::Vector4d& q_joint, ControlStep& step) const;
   Eigen::Vector4d limited_hold(const Eigen::Vector4d& braking) const;
   Eigen::Matrix4d deviation_weight(const Eigen::Matrix4d& jacobian) const;
-  Eigen::Vector4d slow_to_rate(const Eigen::Vector4d& velocity) const;
+  static Eigen::Vector4d slow_to_rate(const Eigen::Vector4d& velocity, const Eigen::Vector4d& rate);
 
   ControllerConfig config_;
   TrackingGains exact_gains_;
@@ -100,6 +108,9 @@ class VisualController {
   ArmResponse arm_response_;
   FollowingErrorLimit following_error_limit_;
   FrozenImage frozen_image_;
+  ImageResponse image_response_;
+  ErrorGrowth error_growth_;
+  HoldReason until_start_ = HoldReason::none;  ///< a reason that only an operator ends
   WildJoints wild_joints_;
   JointPath path_;
   HoldReason suspended_ = HoldReason::none;

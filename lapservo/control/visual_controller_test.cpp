@@ -255,7 +255,8 @@ TestRig wrong_rig(Random& random) {
 
 void expect_converged(std::uint64_t seed, const Flaws& flaws, double within_s) {
   SCOPED_TRACE(seed);
-  const ControllerConfig config = testing::test_config(flaws);
+  ControllerConfig config = testing::test_config(flaws);
+  config.model_error = 2;
   Random random(1000 + seed);
   const auto done =
       run(config, testing::model_of(wrong_rig(random)), flaws, set_point(paper_sinusoids().offset), within_s + 3, seed);

@@ -6,7 +6,7 @@ namespace lapservo {
 using namespace internal;
 namespace {
 
-constexpr Words<Blocked, 20> blocked_words{{{Blocked::none, "none"},
+constexpr Words<Blocked, 24> blocked_words{{{Blocked::none, "none"},
                                             {Blocked::no_joint_states, "no_joint_states"},
                                             {Blocked::old_joint_states, "old_joint_states"},
                                             {Blocked::non_finite_joints, "non_finite_joints"},
@@ -18,12 +18,16 @@ constexpr Words<Blocked, 20> blocked_words{{{Blocked::none, "none"},
                                             {Blocked::far_from_setpoint, "far_from_setpoint"},
                                             {Blocked::foreign_command, "foreign_command"},
                                             {Blocked::second_source, "second_source"},
+                                            {Blocked::restarted, "restarted"},
+                                            {Blocked::moving, "moving"},
+                                            {Blocked::second_camera, "second_camera"},
                                             {Blocked::second_reader, "second_reader"},
                                             {Blocked::no_reader, "no_reader"},
                                             {Blocked::displaced, "displaced"},
                                             {Blocked::held, "held"},
                                             {Blocked::operator_absent, "operator_absent"},
                                             {Blocked::loop_held, "loop_held"},
+                                            {Blocked::loop_late, "loop_late"},
                                             {Blocked::arming, "arming"},
                                             {Blocked::ended, "ended"}}};
 static_assert(names_all(blocked_words, Blocked::ended));

@@ -19,12 +19,16 @@ enum class Blocked {
   far_from_setpoint,  ///< the arm is not where its own setpoint is
   foreign_command,    ///< another program moves the arm
   second_source,      ///< two programs publish the states of this arm
+  restarted,          ///< another program than before publishes its states: nothing that was known holds
+  moving,             ///< the arm moves without being sent anywhere
+  second_camera,      ///< two programs publish the images that the loop goes by
   second_reader,      ///< more programs than the arm's read its setpoints
   no_reader,          ///< nobody reads its setpoints
   displaced,          ///< the arm is not where it was sent: something moved or blocked it
   held,               ///< a person said stop
   operator_absent,    ///< the operator does not press what has to be pressed
-  loop_held,          ///< the loop itself held the arm for too long
+  loop_held,          ///< the loop itself held the arm for too long, or for a reason that needs a person
+  loop_late,          ///< the loop stood still: nobody watched the arm meanwhile
   arming,             ///< a start was said and waits until the arm has been ready for long enough
   ended,              ///< the run has ended
 };

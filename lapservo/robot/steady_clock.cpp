@@ -1,6 +1,7 @@
 #include "lapservo/robot/steady_clock.h"
 
 #include <chrono>
+#include <ctime>
 #include <thread>
 
 namespace lapservo {
@@ -9,6 +10,15 @@ using Seconds = std::chrono::duration<double>;
 
 double SteadyClock::now_s() const {
   return Seconds(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+double SteadyClock::suspended_s() const {
+  const auto seconds = [](clockid_t clock) {
+    std::timespec time{};
+    clock_gettime(clock, &time);
+    return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+  };
+  return seconds(CLOCK_BOOTTIME) - seconds(CLOCK_MONOTONIC);
 }
 
 void SteadyClock::sleep_until(double time_s) {

@@ -8,6 +8,7 @@ namespace lapservo {
 class SteadyClock : public Clock {
  public:
   double now_s() const override;
+  double suspended_s() const override;
   void sleep_until(double time_s) override;
 };
 

@@ -16,33 +16,35 @@ Blocked arm_of(const JointState& state, double now_s, double max_age_s) {
   return now_s - state.time_s <= max_age_s ? Blocked::none : Blocked::old_joint_states;
 }
 
-constexpr internal::Words<Blocked, 13> remedies{
+constexpr internal::Words<Blocked, 16> remedies{
     {{Blocked::no_joint_states, "check the arm's namespace and the names of its joints"},
      {Blocked::old_joint_states, "the arm is silent: restore its joint states"},
      {Blocked::non_finite_joints, "check the arm"},
-     {Blocked::no_setpoint, "enable and home the arm"},
+     {Blocked::no_setpoint, "its setpoint_js is missing or late: an arm that is enabled and homed sends it"},
      {Blocked::no_operating_state, "let the arm repeat its operating_state"},
      {Blocked::not_homed, "home the arm"},
      {Blocked::busy, "wait until the arm's own motion has ended"},
      {Blocked::far_from_setpoint, "let the arm settle at its own setpoint"},
      {Blocked::foreign_command, "another program commands the arm: end that"},
      {Blocked::second_source, "two programs publish the arm's states: end one of them"},
+     {Blocked::restarted, "another program than before publishes the arm's states"},
+     {Blocked::moving, "it moves by itself, or another program moves it: let it come to rest"},
+     {Blocked::second_camera, "two programs publish the camera's images: end one of them"},
      {Blocked::second_reader, "other nodes than the arm's read servo_jp: end them, or allow their number"},
      {Blocked::no_reader, "nobody reads servo_jp: start the arm"},
      {Blocked::operator_absent, "press what says that the operator is present"}}};
 
 std::string names_of(const Commanders& holders) {
-  constexpr const char* names[]{"the program", "the page", "the topic"};
+  constexpr const char* names[]{"the program", "the page", "a program on the topic"};
   std::string text;
-  for (std::size_t who = 0; who < holders.size(); ++who)
-    if (holders[who]) text += (text.empty() ? "" : " and ") + std::string(names[who]);
+  for (const Commander& who : holders) text += (text.empty() ? "" : " and ") + std::string(names[who.kind]);
   return text;
 }
 
 }  // namespace
 
 Supervisor::Supervisor(Robot& robot, const Clock& clock, const SupervisorConfig& config)
-    : robot_(robot), clock_(clock), config_(config) {
+    : robot_(robot), clock_(clock), config_(config), suspended_s_(clock.suspended_s()) {
   if (robot.is_simulated()) config_.settle_s = 0;
 }
 
@@ -52,14 +54,17 @@ JointState Supervisor::state() {
   input_.time_s = clock_.now_s();
   input_.arm = arm_of(state, input_.time_s, config_.max_reading_age_s);
   input_.follows = state.follows;
+  constexpr double plain_s = 0.05;  // two clocks are not read at the same time
+  const double before_s = std::exchange(suspended_s_, clock_.suspended_s());
+  input_.suspended = suspended_s_ - before_s > plain_s;
   // In the step before, too: the loop begins where the joints were then.
   input_.at_rest = !path_ || path_->at(state_.time_s).velocity.isZero();
   input_.operator_present = !is_present_ || is_present_();
   if (state.started) start(Commander::program, input_.time_s);
   const bool was_armed = armed();
   state_ = next(state_, input_, config_);
-  input_.stops.reset();
-  input_.starts = {};
+  input_.stops.clear();
+  input_.starts.clear();
   if (was_armed && !armed()) robot_.release();
   if (!armed() && state.operating_state == OperatingState::enabled) state.operating_state = OperatingState::paused;
   state.started = state_.started;
@@ -74,13 +79,16 @@ void Supervisor::send(const JointPath& path) {
 }
 
 void Supervisor::start(Commander who, double said_s, bool force) {
-  input_.starts[static_cast<std::size_t>(who)] = SupervisorInput::Start{said_s, force};
+  input_.starts.push_back({who, said_s, force});
 }
 
-void Supervisor::tell_loop(std::string_view hold_reason, bool displaced) {
+void Supervisor::tell_loop(const std::string& hold_reason, Blocked event) {
   input_.loop_holds = !hold_reason.empty();
-  input_.displaced = displaced;
-  if (armed()) loop_reason_ = hold_reason;
+  input_.loop_event = event;
+  if (!armed()) return;
+  loop_reason_ = hold_reason;
+  if (event == Blocked::none && input_.loop_holds)
+    loop_reason_ += fmt::format(" for more than {} s", config_.max_loop_hold_s);
 }
 
 void Supervisor::end() {
@@ -108,15 +116,13 @@ std::string Supervisor::text() const {
   std::string part;
   if (blocked() == Blocked::ended) return "hold: ended";
   if (blocked() == Blocked::held) {
-    part = fmt::format("by {}: start there", names_of(state_.held_by));
+    part = fmt::format("by {}: start there, or with force", names_of(state_.held_by));
   } else if (blocked() == Blocked::arming) {
     part = fmt::format("the arm has to be ready for {} s", config_.settle_s);
   } else if (state_.obstacle != Blocked::none) {
     part = remedy() + (state_.phase == Phase::held ? ", then start" : "");
   } else {
-    part = state_.reason == Blocked::loop_held
-               ? fmt::format("{} for more than {} s: start goes on", loop_reason_, config_.max_loop_hold_s)
-               : "start goes on";
+    part = (state_.reason == Blocked::loop_held ? loop_reason_ + "; " : "") + "say start to continue";
   }
   return fmt::format("hold: {} ({})", to_string(blocked()), part);
 }

@@ -29,12 +29,14 @@ class Supervisor : public Robot {
   bool is_simulated() const override { return robot_.is_simulated(); }
 
   // These count in the next step.
-  void stop(Commander who) { input_.stops.set(static_cast<std::size_t>(who)); }
+  void stop(Commander who) { input_.stops.insert(who); }
   /// `said_s`: on the clock; `force`: whoever holds.
   void start(Commander who, double said_s, bool force = false);
-  /// The loop's decision: empty where the arm is to move, else the reason of the hold; `displaced`: because the arm is
-  /// not where it was sent.
-  void tell_loop(std::string_view hold_reason, bool displaced);
+  /// The loop's decision: empty where the arm is to move, else why it holds, in words. `event`: Blocked::displaced or
+  /// Blocked::loop_held where that needs a start at once.
+  void tell_loop(const std::string& hold_reason, Blocked event = Blocked::none);
+  /// Something that needs a start at once, seen outside of the loop's step.
+  void report(Blocked event) { input_.loop_event = event; }
   /// Whether the operator presses what has to be pressed, now.
   void watch_operator(std::function<bool()> is_present) { is_present_ = std::move(is_present); }
   /// The arm comes to rest and stays held, whatever is said.
@@ -60,6 +62,7 @@ class Supervisor : public Robot {
   OperatingState operating_state_ = OperatingState::disabled;
   std::string loop_reason_;
   std::function<bool()> is_present_;
+  double suspended_s_;  ///< Clock::suspended_s() in the step before
 };
 
 }  // namespace lapservo

@@ -5,7 +5,6 @@
 #include <functional>
 #include <limits>
 #include <optional>
-#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -33,6 +32,7 @@ class Bench : public Robot, public Clock {
   void release() override { released = true; }
   bool is_simulated() const override { return simulated; }
   double now_s() const override { return now; }
+  double suspended_s() const override { return suspended; }
   void sleep_until(double time_s) override { now = time_s; }
 
   // As the loop does once a period: starts anew where the arm is while it is held.
@@ -58,7 +58,7 @@ class Bench : public Robot, public Clock {
   }
   void start(Commander who = Commander::program) { supervisor.start(who, now); }
 
-  double now = 100, reading_age_s = 0;
+  double now = 100, suspended = 0, reading_age_s = 0;
   OperatingState operating_state = OperatingState::enabled;
   Blocked blocked = Blocked::none, pulse = Blocked::none;
   bool simulated = false, released = false;
@@ -122,7 +122,10 @@ TEST(Supervisor, AfterAnythingButTrackingItIsHeldUntilAStart) {
       {"busy", [](Bench& b, bool on) { b.pulse = on ? Blocked::busy : Blocked::none; }},
       {"foreign_command", [](Bench& b, bool on) { b.blocked = on ? Blocked::foreign_command : Blocked::none; }},
       {"non_finite_joints", [](Bench& b, bool on) { b.blocked = on ? Blocked::non_finite_joints : Blocked::none; }},
-      {"displaced", [](Bench& b, bool on) { b.supervisor.tell_loop(on ? "not_following" : "", on); }},
+      {"displaced",
+       [](Bench& b, bool on) {
+         b.supervisor.tell_loop(on ? "not_following" : "", on ? Blocked::displaced : Blocked::none);
+       }},
   };
   for (const auto& [reason, event] : events) {
     SCOPED_TRACE(reason);
@@ -138,7 +141,7 @@ TEST(Supervisor, AfterAnythingButTrackingItIsHeldUntilAStart) {
     event(bench, false);
     EXPECT_FALSE(bench.moves(3));
     EXPECT_EQ(bench.sends, sends);
-    EXPECT_EQ(bench.supervisor.text(), "hold: " + reason + " (start goes on)");
+    EXPECT_EQ(bench.supervisor.text(), "hold: " + reason + " (say start to continue)");
     bench.start();
     EXPECT_TRUE(bench.moves());
     EXPECT_EQ(bench.starts, 2);
@@ -160,7 +163,7 @@ TEST(Supervisor, ASilenceThatIsShortPassesAndALongOneNeedsAStart) {
       bench.reading_age_s = 0;
       EXPECT_EQ(bench.moves(), silence_s < 0.5);
     }
-    EXPECT_EQ(bench.supervisor.text(), "hold: old_joint_states (start goes on)");
+    EXPECT_EQ(bench.supervisor.text(), "hold: old_joint_states (say start to continue)");
     Bench stopped;
     stopped.pass(1);
     stopped.blocked = Blocked::no_setpoint;
@@ -170,6 +173,48 @@ TEST(Supervisor, ASilenceThatIsShortPassesAndALongOneNeedsAStart) {
     stopped.blocked = Blocked::none;
     EXPECT_FALSE(stopped.moves(2));
   }
+}
+
+// However long it hung; the arm has spoken all the while, and somebody may have moved it.
+TEST(Supervisor, ALoopThatStoodStillNeedsAStart) {
+  for (const double hung_s : {0.3, 0.6, 5.0, 30.0}) {
+    Bench bench;
+    bench.pass(1);
+    bench.now += hung_s;
+    const int sends = bench.sends;
+    bench.pass(tick_s);
+    EXPECT_EQ(bench.supervisor.armed(), hung_s < 0.5);
+    if (hung_s < 0.5) continue;
+    EXPECT_EQ(bench.sends, sends);
+    EXPECT_EQ(bench.supervisor.text(), "hold: loop_late (say start to continue)");
+    bench.supervisor.start(Commander::page, bench.now - hung_s / 2);  // said meanwhile
+    EXPECT_FALSE(bench.moves(2));
+    bench.start();
+    EXPECT_TRUE(bench.moves());
+  }
+}
+
+TEST(Supervisor, AComputerThatWasSuspendedNeedsAStart) {
+  Bench bench;
+  bench.pass(1);
+  bench.suspended = 3;
+  bench.pass(tick_s);
+  EXPECT_EQ(bench.supervisor.blocked(), Blocked::loop_late);
+  bench.pass(0.5);  // it brakes
+  EXPECT_FALSE(bench.moves(2));
+  bench.start();
+  EXPECT_TRUE(bench.moves());
+}
+
+// An arm that fell silent while the loop stood still, too, is no short silence.
+TEST(Supervisor, ASilenceCountsFromWhenTheArmWasReadyLast) {
+  Bench bench;
+  bench.pass(1);
+  bench.reading_age_s = 0.2;
+  bench.now += 0.45;
+  bench.pass(0.1);
+  bench.reading_age_s = 0;
+  EXPECT_FALSE(bench.moves(1));
 }
 
 // An arm that is enabled and homed is all right for a moment before it homes.
@@ -220,18 +265,45 @@ TEST(Supervisor, WhoHoldsHasToLetGoUnlessTheStartHasForce) {
   bench.supervisor.stop(Commander::page);
   bench.supervisor.stop(Commander::topic);
   bench.pass(1);
-  EXPECT_EQ(bench.supervisor.text(), "hold: held (by the page and the topic: start there)");
+  EXPECT_EQ(bench.supervisor.text(), "hold: held (by the page and a program on the topic: start there, or with force)");
   bench.start(Commander::program);
   EXPECT_FALSE(bench.moves());
   bench.start(Commander::page);
   EXPECT_FALSE(bench.moves());
-  EXPECT_EQ(bench.supervisor.text(), "hold: held (by the topic: start there)");
+  EXPECT_EQ(bench.supervisor.text(), "hold: held (by a program on the topic: start there, or with force)");
   bench.start(Commander::topic);
   EXPECT_TRUE(bench.moves());
   bench.supervisor.stop(Commander::topic);
   bench.pass(1);
   bench.supervisor.start(Commander::page, bench.now, true);
   EXPECT_TRUE(bench.moves());
+}
+
+// Each program on the topic holds for itself.
+TEST(Supervisor, AnotherProgramOnTheTopicDoesNotLetGo) {
+  Bench bench;
+  bench.pass(1);
+  bench.supervisor.stop({Commander::topic, 1});
+  bench.pass(1);
+  bench.start({Commander::topic, 2});
+  EXPECT_FALSE(bench.moves());
+  bench.start({Commander::topic, 1});
+  EXPECT_TRUE(bench.moves());
+}
+
+TEST(Supervisor, AStartThatWasSaidBeforeTheHoldIsVoid) {
+  Bench bench;
+  bench.pass(1);
+  const double before_s = bench.now;
+  bench.pass(0.3);
+  bench.operating_state = OperatingState::fault;
+  bench.pass(0.1);
+  bench.operating_state = OperatingState::enabled;
+  bench.pass(0.1);
+  bench.supervisor.start(Commander::page, before_s);
+  EXPECT_FALSE(bench.moves(1));
+  bench.start(Commander::page);
+  EXPECT_TRUE(bench.moves(0.8));
 }
 
 TEST(Supervisor, WithoutTheOperatorNothingMoves) {
@@ -257,16 +329,16 @@ TEST(Supervisor, AHoldOfTheLoopOfMoreThanTwoSecondsNeedsAStart) {
   Bench bench;
   bench.pass(1);
   for (const double held_s : {1.9, 2.1}) {
-    bench.supervisor.tell_loop("marker_lost", false);
+    bench.supervisor.tell_loop("marker_lost");
     bench.pass(held_s);
-    bench.supervisor.tell_loop("", false);
+    bench.supervisor.tell_loop("");
     EXPECT_EQ(bench.moves(), held_s < 2);
   }
-  EXPECT_EQ(bench.supervisor.text(), "hold: loop_held (marker_lost for more than 2 s: start goes on)");
+  EXPECT_EQ(bench.supervisor.text(), "hold: loop_held (marker_lost for more than 2 s; say start to continue)");
   Bench first;  // whose camera has not begun
-  first.supervisor.tell_loop("no_image_yet", false);
+  first.supervisor.tell_loop("no_image_yet");
   first.pass(10);
-  first.supervisor.tell_loop("", false);
+  first.supervisor.tell_loop("");
   EXPECT_TRUE(first.moves());
 }
 
@@ -297,41 +369,45 @@ class Model {
  public:
   bool may_move(const SupervisorInput& input, const SupervisorConfig& config) {
     const double now = input.time_s;
-    const bool ready = input.arm == Blocked::none && now >= last_s_;
+    const double before_s = last_s_.value_or(now);
+    const bool ready = input.arm == Blocked::none && now >= before_s, late = now - before_s > config.max_silence_s;
     last_s_ = now;
-    if (!ready) ready_s_ = std::numeric_limits<double>::infinity();
+    if (late && granted_) granted_ = moved_ = false, held_s_ = now, silent_s_.reset();
+    if (!ready || late) ready_s_ = std::numeric_limits<double>::infinity();
     if (ready) ready_s_ = std::min(ready_s_, now);
-    for (std::size_t who = 0; who < 3; ++who)
-      if (input.stops[who]) holders_.insert(who);
+    for (const Commander& who : input.stops) holders_.insert(who);
     bool start = false;
-    for (std::size_t who = 0; who < 3; ++who) {
-      const auto& said = input.starts[who];
-      if (input.stops.any() || !said || std::abs(now - said->said_s) > config.start_lasts_s) continue;
+    for (const auto& said : input.starts) {
+      if (!input.stops.empty() || std::abs(now - said.said_s) > config.start_lasts_s || said.said_s < held_s_) continue;
       start = true;
-      said->force ? holders_.clear() : static_cast<void>(holders_.erase(who));
+      said.force ? holders_.clear() : static_cast<void>(holders_.erase(said.who));
     }
     const bool alone = holders_.empty() && input.operator_present && !input.ended, free = ready && alone;
+    if (!input.stops.empty() || (!free && free_)) held_s_ = now;
+    free_ = free;
     const bool silent = !ready && (input.arm == Blocked::none || is_silence(input.arm));
-    if (!silent_s_ && moved_ && silent) silent_s_ = now;
+    if (moved_) silent_s_ = last_ready_s_;
+    if (ready) last_ready_s_ = now;
     const bool passes = alone && silent && silent_s_ && now - *silent_s_ <= config.max_silence_s;
     const bool passed = free && silent_s_ && input.at_rest;
     if (!passes && !(free && !input.at_rest)) silent_s_.reset();
-    if (!free && !passes) granted_ = false;
+    if (!free && !passes && std::exchange(granted_, false)) held_s_ = now;
     if (free && start) granted_ = true;
     const bool moved = moved_;
     moved_ = granted_ && (passed || (moved && free) || (free && input.at_rest && now - ready_s_ >= config.settle_s));
     if (!moved || !moved_ || !input.loop_holds) hold_s_.reset();
     if (moved && moved_ && input.loop_holds && !hold_s_) hold_s_ = now;
     const bool too_long = hold_s_ && now - *hold_s_ > config.max_loop_hold_s;
-    if (moved && moved_ && (input.displaced || too_long)) granted_ = moved_ = false;
+    if (moved && moved_ && (input.loop_event != Blocked::none || too_long)) granted_ = moved_ = false, held_s_ = now;
     return moved_;
   }
 
  private:
-  double last_s_ = -1e300, ready_s_ = std::numeric_limits<double>::infinity();
+  std::optional<double> last_s_;
+  double ready_s_ = std::numeric_limits<double>::infinity(), last_ready_s_ = -1e300, held_s_ = -1e300;
   std::optional<double> hold_s_, silent_s_;
-  std::set<std::size_t> holders_;
-  bool granted_ = false, moved_ = false;
+  Commanders holders_;
+  bool granted_ = false, moved_ = false, free_ = true;
 };
 
 SupervisorInput any_input(internal::Random& random, const SupervisorInput& before) {
@@ -343,11 +419,12 @@ SupervisorInput any_input(internal::Random& random, const SupervisorInput& befor
   input.at_rest = happens(0.7);
   input.operator_present = happens(before.operator_present ? 0.99 : 0.5);
   input.loop_holds = happens(before.loop_holds ? 0.97 : 0.03);
-  input.displaced = happens(0.002);
+  if (happens(0.002)) input.loop_event = Blocked::displaced;
   input.ended = before.ended || happens(0.0005);
-  for (std::size_t who = 0; who < 3; ++who) {
-    if (happens(0.01)) input.stops.set(who);
-    if (happens(0.06)) input.starts[who] = SupervisorInput::Start{input.time_s - random.uniform(0, 1.5), happens(0.1)};
+  for (const Commander who : {Commander(Commander::program), Commander(Commander::page), Commander(Commander::topic, 1),
+                              Commander(Commander::topic, 2)}) {
+    if (happens(0.01)) input.stops.insert(who);
+    if (happens(0.06)) input.starts.push_back({who, input.time_s - random.uniform(0, 1.5), happens(0.1)});
   }
   return input;
 }

@@ -64,11 +64,13 @@ ControllerConfig load_controller(const std::filesystem::path& path, const Contro
   ControllerConfig config = base;
   const YamlField file = YamlField::read(path, "controller file");
   if (!file.is_map()) file.fail(file.value_text(), "a map of the controller's keys");
-  expect_keys(file, {{"mode", "period_s", "gains_per_s", "delay_s", "limits", "window"}, {}});
+  expect_keys(file, {{"mode", "period_s", "gains_per_s", "delay_s", "model_error", "limits", "window"}, {}});
   if (const YamlField mode = file["mode"]; mode.present()) config.mode = read_mode(mode);
   if (const YamlField period = file["period_s"]; period.present()) config.period_s = period.number("a finite number");
   if (const YamlField gains = file["gains_per_s"]; gains.present()) config.gains.per_s = four(gains);
   if (const YamlField delay = file["delay_s"]; delay.present()) config.observer.delay_s = read_delay(delay);
+  if (const YamlField error = file["model_error"]; error.present())
+    config.model_error = error.number("a number above 0");
   if (const YamlField limits = file["limits"]; limits.present()) config.limits = read_limits(limits, config.limits);
   if (const YamlField window = file["window"]; window.present())
     config.window = read_window(window, config.window.value_or(ImageWindow{}));
@@ -76,9 +78,10 @@ ControllerConfig load_controller(const std::filesystem::path& path, const Contro
 }
 
 std::string controller_yaml(const ControllerConfig& config) {
-  std::string text = fmt::format("mode: {}\nperiod_s: {}\ngains_per_s: {}\ndelay_s: {}\n", to_string(config.mode),
-                                 config.period_s, list_of(config.gains.per_s),
-                                 config.observer.delay_s ? fmt::format("{}", *config.observer.delay_s) : "estimate");
+  std::string text = fmt::format("mode: {}\nperiod_s: {}\ngains_per_s: {}\ndelay_s: {}\nmodel_error: {}\n",
+                                 to_string(config.mode), config.period_s, list_of(config.gains.per_s),
+                                 config.observer.delay_s ? fmt::format("{}", *config.observer.delay_s) : "estimate",
+                                 config.model_error);
   text +=
       fmt::format("limits:\n  lower: {}\n  upper: {}\n  rate: {}\n  acceleration: {}\n", list_of(config.limits.lower),
                   list_of(config.limits.upper), list_of(config.limits.rate), list_of(config.limits.acceleration));

@@ -140,7 +140,8 @@ bool EndoscopeRecovery::stepped(const ImageMeasurement& image, bool delay_is_kno
 
 void EndoscopeRecovery::doubt(HoldReason reason, VisualController& controller) {
   const bool watches = std::holds_alternative<Watching>(state_);
-  if (reason == HoldReason::psi_contradicted && watches && seen_.size() >= explain_at_) blames_rig(controller, true);
+  const bool contradicted = reason == HoldReason::psi_contradicted || reason == HoldReason::image_not_following;
+  if (contradicted && watches && seen_.size() >= explain_at_) blames_rig(controller, true);
   if (reason != HoldReason::wild_joints && reason != HoldReason::frozen_image) return;
   seen_.clear();
   sees_from_start_ = false;

@@ -27,9 +27,25 @@ void withhold_contradicted(ControlTick& tick) {
   tick.seen->measurement.found = false;
 }
 
-void tell(Supervisor& arm, const ControlStep& control) {
-  arm.tell_loop(control.action == ControlAction::hold ? to_string(control.reason) : "",
-                control.reason == HoldReason::not_following);
+Blocked needs_start(HoldReason reason) {
+  switch (reason) {
+    case HoldReason::not_following:
+      return Blocked::displaced;
+    case HoldReason::image_not_following:
+    case HoldReason::error_grows:
+    case HoldReason::delay_not_found:
+      return Blocked::loop_held;
+    default:
+      return Blocked::none;
+  }
+}
+
+void tell(Supervisor& arm, const ServoDecision& decision) {
+  const ControlStep& control = decision.control;
+  if (control.action != ControlAction::hold) return arm.tell_loop("");
+  const std::string_view reason = to_string(control.reason);
+  arm.tell_loop(decision.remedy.empty() ? std::string(reason) : fmt::format("{}: {}", reason, decision.remedy),
+                needs_start(control.reason));
 }
 
 // However the loop ends, the arm comes to rest before those who drive it are gone.
@@ -134,7 +150,7 @@ void run(Supervisor& arm, ImageStream& images, Clock& clock, const RunConfig& co
     tick.decision = servo.step(tick.input);
     if (tick.decision.send) arm.send(servo.path());
     if (tick.decision.release) arm.release();
-    tell(arm, tick.decision.control);
+    tell(arm, tick.decision);
     if (tick.decision.registration != registration) {
       registration = tick.decision.registration;
       vision->use(registration, tick.decision.camera_from_rcm);

@@ -12,20 +12,11 @@ namespace lapservo::internal {
 namespace {
 
 std::string reason_text(const ServoDecision& decision) {
-  const std::string_view part = operators_part(decision);
-  return std::string(to_string(decision.control.reason)) + (part.empty() ? "" : fmt::format(" ({})", part));
+  const std::string& remedy = decision.remedy;
+  return std::string(to_string(decision.control.reason)) + (remedy.empty() ? "" : fmt::format(" ({})", remedy));
 }
 
 }  // namespace
-
-std::string_view operators_part(const ServoDecision& decision) {
-  const HoldReason reason = decision.control.reason;
-  if (reason == HoldReason::wrong_rig) return decision.wrong_rig;
-  if (reason == HoldReason::endoscope_moved)
-    return "move the instrument, by hand or teleoperation, until endoscope_measured";
-  if (reason == HoldReason::endoscope_measured) return "start goes on";
-  return "";
-}
 
 std::string state_text(const ServoDecision& decision) {
   const std::string action(to_string(decision.control.action));
@@ -38,7 +29,7 @@ std::string block_of(const Supervisor& arm) {
 
 std::string state_text(const ServoDecision& decision, const Supervisor& arm) {
   // Whatever else holds the arm meanwhile, this is the operator's part.
-  return arm.armed() || !operators_part(decision).empty() ? state_text(decision) : arm.text();
+  return arm.armed() || !decision.remedy.empty() ? state_text(decision) : arm.text();
 }
 
 void RunSummary::follow_registration(const ControlTick& tick) {

@@ -13,8 +13,6 @@
 
 namespace lapservo::internal {
 
-/// The operator's action that ends a hold for that reason; empty where it ends by itself.
-std::string_view operators_part(const ServoDecision& decision);
 /// "track", "hold: marker_lost", "hold: endoscope_measured (...)" with the operator's part.
 std::string state_text(const ServoDecision& decision);
 /// The same, or why the arm is not moved.

@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 #include <utility>
+
+#include <fmt/format.h>
 
 #include "lapservo/servo/image_features.h"
 
@@ -15,6 +18,35 @@ const Eigen::Vector4d at_rest(0.002, 0.002, 0.0003, 0.01);
 
 constexpr int contradicted_after = 10;
 
+std::string unanswered_text(const Unanswered& found, const std::array<std::string, 4>& names) {
+  const std::string& name = names[static_cast<std::size_t>(found.joint)];
+  constexpr double other_way = -0.5;
+  if (found.slope < other_way)
+    return fmt::format("the image moves the other way: joints.sign of {} is wrong, or it is another arm's camera",
+                       name);
+  return fmt::format(
+      "the image does not follow {}: another arm's camera, a slipping instrument, a frozen image, or images that "
+      "come more than 0.3 s late",
+      name);
+}
+
+std::string remedy_of(const ControlStep& control, const std::array<std::string, 4>& names) {
+  switch (control.reason) {
+    case HoldReason::endoscope_moved:
+      return "move the instrument, by hand or teleoperation, until endoscope_measured";
+    case HoldReason::endoscope_measured:
+      return "start goes on";
+    case HoldReason::image_not_following:
+      return control.unanswered ? unanswered_text(*control.unanswered, names) : "";
+    case HoldReason::error_grows:
+      return "the arm moves away from its goal: check joints.sign, camera_from_rcm and whose image it is";
+    case HoldReason::delay_not_found:
+      return "images and joints agree at no delay up to 0.3 s: check whose image it is, or give delay_s";
+    default:
+      return "";
+  }
+}
+
 bool orderly(const ControlStep& control) {
   return control.has_setpoint && control.setpoint.position.allFinite() && control.setpoint.velocity.allFinite();
 }
@@ -25,6 +57,7 @@ Servo::Servo(const ControllerConfig& config, FeatureModel model)
     : controller_(config, model), registered_(model != nullptr) {}
 
 Servo::Servo(const ControllerConfig& config, const Rig& rig) : Servo(config, feature_model(rig)) {
+  if (rig.instruments.front().joints) names_ = rig.instruments.front().joints->names;
   camera_from_rcm_ = rig.instruments.front().camera_from_rcm;
   if (config.mode == ControlMode::fused) recovery_.emplace(rig);
 }
@@ -38,7 +71,7 @@ ServoDecision Servo::step(const ServoInput& input) {
   recovery_->follow(counted, decision.control, controller_);
   decision.registration = recovery_->registration();
   decision.camera_from_rcm = recovery_->camera_from_rcm();
-  if (const auto why = recovery_->wrong_rig()) decision.wrong_rig = why->text(recovery_->instrument());
+  if (const auto why = recovery_->wrong_rig()) decision.remedy = why->text(recovery_->instrument());
   return decision;
 }
 
@@ -49,6 +82,7 @@ ServoDecision Servo::decide(const ServoInput& input) {
   controller_.expect_following(input.joints.follows);
   const bool enabled = input.joints.operating_state == OperatingState::enabled;
   if (!std::exchange(enabled_, enabled) && enabled) controller_.need_image_since(input.time_s);
+  if (input.joints.started) controller_.restart_tests();
   decision.control = controller_.step(input.time_s, q, input.image, input.desired, input.readings);
   if (recovery_) recovery_->doubt(decision.control.reason, controller_);
   watch_registration(input);
@@ -56,9 +90,10 @@ ServoDecision Servo::decide(const ServoInput& input) {
   decision.send = orderly(decision.control);
   start_anew_when_at_rest(input, decision.control.reason);
   decision.release = recovery_ && recovery_->moved();
+  decision.remedy = remedy_of(decision.control, names_);
   if (enabled && !decision.release) return decision;
   decision.control.action = ControlAction::hold;
-  if (!decision.release) decision.control.reason = HoldReason::arm_not_enabled;
+  if (!decision.release) decision.control.reason = HoldReason::arm_not_enabled, decision.remedy.clear();
   decision.send = false;
   // Setpoints stay where the arm is, so that nothing jumps when it is to move again.
   if (std::isfinite(input.time_s) && q.allFinite()) controller_.reset(input.time_s, q);

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <array>
 #include <optional>
+#include <string>
 
 #include "lapservo/control/visual_controller.h"
 #include "lapservo/rig/rig.h"
@@ -30,7 +32,8 @@ class Servo {
   void watch_registration(const ServoInput& input);
 
   VisualController controller_;
-  std::optional<Rigid3> camera_from_rcm_;  ///< the rig's
+  std::array<std::string, 4> names_{"theta", "phi", "rho", "psi"};  ///< of the joints
+  std::optional<Rigid3> camera_from_rcm_;                           ///< the rig's
   std::optional<EndoscopeRecovery> recovery_;
   bool enabled_ = false;          ///< in the step before
   bool registered_;               ///< the rig says where the RCM is

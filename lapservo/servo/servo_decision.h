@@ -32,9 +32,9 @@ struct ServoDecision {
   int registration = 0;
   std::optional<Rigid3> camera_from_rcm;  ///< nullopt until that start, and where the rig has none
   bool release = false;                   ///< until that start the arm is the operator's: Robot::release()
-  /// With HoldReason::wrong_rig: what of the rig explains best that joints and images have disagreed from the start,
-  /// and the remedy, in one line. Else empty.
-  std::string wrong_rig;
+  /// The fault and its remedy, in one line, where a person has to act; else empty. With HoldReason::wrong_rig: what
+  /// of the rig explains best that joints and images have disagreed from the start.
+  std::string remedy;
   bool send = false;  ///< the arm is to follow path(); else it is left alone and holds by itself
 };
 

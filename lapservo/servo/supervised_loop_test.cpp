@@ -55,7 +55,7 @@ class Room : public Robot, public Clock {
     if (image_s && found) newest_s = std::max(newest_s, *image_s);
     const ServoDecision decision = servo_.step(input);
     if (decision.send) arm.send(servo_.path());
-    arm.tell_loop(decision.control.action == ControlAction::hold ? "held" : "", false);
+    arm.tell_loop(decision.control.action == ControlAction::hold ? "held" : "");
     now_ += lasts_s;
     if (!enabled) path_.reset();
     if (path_) q = path_->at(now_).position;
@@ -119,9 +119,9 @@ TEST(SupervisedLoop, NoJointMovesWhereNothingAllowsIt) {
       if (happens(0.03)) camera = !camera;
       if (happens(room.enabled ? 0.01 : 0.3)) room.enabled = !room.enabled;
       room.blocked = happens(0.01) ? Blocked::busy : Blocked::none;
-      if (happens(0.01)) room.arm.stop(static_cast<Commander>(random.uniform(0, 3)));
+      if (happens(0.01)) room.arm.stop(static_cast<Commander::Kind>(random.uniform(0, 3)));
       if (happens(0.1))
-        room.arm.start(static_cast<Commander>(random.uniform(0, 3)), room.now_s() - random.uniform(0, 1.2),
+        room.arm.start(static_cast<Commander::Kind>(random.uniform(0, 3)), room.now_s() - random.uniform(0, 1.2),
                        happens(0.2));
       const double age_s = happens(0.1) ? random.uniform(0, 0.3) : 0;
       room.tick(camera ? std::optional(room.now_s() - age_s) : std::nullopt, happens(0.97),

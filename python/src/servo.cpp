@@ -331,8 +331,8 @@ void bind_tick(py::module_& m) {
       .def_property_readonly("registration_contradicted",
                              [](const Tick& self) { return self.tick.decision.registration_contradicted; })
       .def_property_readonly(
-          "wrong_rig", [](const Tick& self) { return self.tick.decision.wrong_rig; },
-          "With hold_reason 'wrong_rig': what of the rig is wrong, and the remedy; else empty")
+          "remedy", [](const Tick& self) { return self.tick.decision.remedy; },
+          "The fault and its remedy, where a person has to act; else empty")
       .def_property_readonly("sent", [](const Tick& self) { return self.tick.decision.send; })
       .def_property_readonly(
           "image",

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <optional>
+
+#include "lapservo/control/controller_config.h"
+#include "lapservo/control/trajectory.h"
+
+namespace lapservo::internal {
+
+/// Notices an error that grows while the goal stands: motion that should make it smaller does the opposite.
+class ErrorGrowth {
+ public:
+  explicit ErrorGrowth(const Scales& scales) : scales_(scales) {}
+
+  /// Between two motions.
+  void restart() { goal_.reset(); }
+  /// Features minus desired ones, while the loop tracks. True when their norm has grown to more than one and a half
+  /// times the smallest for this goal, and by 20 feature scales (20 px, 0.1 rad).
+  bool add(const DesiredFeatures& desired, const Eigen::Vector4d& error);
+
+ private:
+  Scales scales_;
+  std::optional<Eigen::Vector4d> goal_;  ///< that stands
+  double smallest_ = 0;                  ///< error for it, in feature scales
+};
+
+}  // namespace lapservo::internal
