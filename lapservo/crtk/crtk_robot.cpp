@@ -140,10 +140,14 @@ void CrtkRobot::command() {
   const auto period =
       std::chrono::duration_cast<std::chrono::steady_clock::duration>(std::chrono::duration<double>(period_s_));
   auto next = std::chrono::steady_clock::now();
+  double suspended_s = clock_.suspended_s();
   while (!ended_) {
     JointMessage message;
     {
+      constexpr double plain_s = 0.05;  // two clocks are not read at the same time
       const std::lock_guard lock(mutex_);
+      const double before_s = std::exchange(suspended_s, clock_.suspended_s());
+      if (suspended_s - before_s > plain_s) interlock_.on_suspended(clock_.now_s());
       if (auto positions = interlock_.tick(clock_.now_s())) {
         message.names = interlock_.names();
         message.positions = std::move(*positions);

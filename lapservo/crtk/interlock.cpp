@@ -5,6 +5,7 @@
 #include <map>
 #include <utility>
 
+#include "lapservo/control/motion_limits.h"
 #include "lapservo/crtk/joint_map.h"
 
 namespace lapservo::internal {
@@ -12,16 +13,45 @@ namespace {
 
 constexpr std::size_t max_joints = 64;
 constexpr double silence_s = 0.5;  // from a sender's last message on another one may be the arm
-constexpr double memory_s = 0.25;  // by which a setpoint that was sent is the arm's
+constexpr double memory_s = 1;     // a setpoint that was sent since then is ours, whenever the arm reports it
 // Tolerance for the arm's changes of a setpoint (units, coupling, rounding); beyond it the setpoint is another
 // program's.
 const Eigen::Vector4d same_q(2e-3, 2e-3, 2e-4, 4e-3);
 constexpr double same_other = 4e-3;
-// Tolerance of an arm's progress along the setpoints. An arm that rounds them all alike keeps their order.
-const Eigen::Vector4d same_place(1e-4, 1e-4, 1e-5, 2e-4);
+// An arm that we do not move stays within same_q for so long; after our own motion it may settle first.
+constexpr double rest_s = 0.5, settling_s = 0.2;
 
 bool all_finite(const std::vector<double>& values) {
   return std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
+}
+
+// An arm that does not move, or moves for somebody else, must not get another setpoint. The others still listen.
+bool obeys(Blocked why) {
+  switch (why) {
+    case Blocked::old_joint_states:
+    case Blocked::no_setpoint:
+    case Blocked::non_finite_joints:
+    case Blocked::second_source:
+    case Blocked::second_reader:
+    case Blocked::no_reader:
+      return true;
+    default:
+      return false;
+  }
+}
+
+// At a distance from where to end: slows down at half the acceleration, and the last part exponentially.
+double approach_speed(double left, double acceleration) {
+  constexpr double time_constant_s = 0.01;
+  return std::min(left / time_constant_s, std::sqrt(acceleration * left));
+}
+
+// Whether a point lies beside the line between two others.
+bool lies_between(const Eigen::Vector4d& q, const Eigen::Vector4d& from, const Eigen::Vector4d& to) {
+  const Eigen::Vector4d way = (to - from).cwiseQuotient(same_q), off = (q - from).cwiseQuotient(same_q);
+  const double length2 = way.squaredNorm();
+  const double part = length2 > 0 ? std::clamp(off.dot(way) / length2, 0.0, 1.0) : 0;
+  return ((off - part * way).array().abs() <= 1).all();
 }
 
 }  // namespace
@@ -45,8 +75,21 @@ bool Interlock::is_of(Source& source, std::uint64_t sender, const std::optional<
     watch(arrival_s);
     return false;
   }
+  if (source.value_or(sender) != sender) begin_anew(arrival_s);
   source = sender;
   return true;
+}
+
+// Another arm, or the same one after its program was started again.
+void Interlock::begin_anew(double arrival_s) {
+  measured_source_.reset(), setpoint_source_.reset(), state_source_.reset();
+  measured_s_.reset(), setpoint_s_.reset();
+  measured_.reset(), setpoint_.reset(), operating_state_.reset();
+  rest_.reset(), moved_s_.reset();
+  sent_.clear();
+  stop(Blocked::restarted);
+  untold_ = Blocked::restarted;
+  blocked_s_ = arrival_s;
 }
 
 std::optional<double> Interlock::stamped(StampClock& clock, const JointMessage& message, double arrival_s) {
@@ -68,9 +111,7 @@ Eigen::Vector4d Interlock::q_of(const JointMessage& message, const Places& place
 }
 
 void Interlock::on_measured(const JointMessage& message, double arrival_s) {
-  const Source before = measured_source_;
   if (!is_of(measured_source_, message.source, measured_s_, arrival_s)) return;
-  if (before.value_or(message.source) != message.source) state_source_.reset();  // an arm that was restarted
   measured_s_ = arrival_s;
   const auto places = places_in(message);
   if (!places) return;
@@ -80,6 +121,7 @@ void Interlock::on_measured(const JointMessage& message, double arrival_s) {
   finite_ = all_finite(message.positions);
   if (finite_) measured_ = Reading{*time_s, arrival_s, message.positions, q_of(message, *places)};
   if (finite_) readings_.add({*time_s, JointVector::from_vector(measured_->q)});
+  watch_rest(arrival_s);
   watch(arrival_s);
 }
 
@@ -91,12 +133,13 @@ void Interlock::on_setpoint(const JointMessage& message, double arrival_s) {
   const auto time_s = stamped(setpoint_clock_, message, arrival_s);
   if (!time_s) return;
   setpoint_ = Reading{*time_s, arrival_s, message.positions, q_of(message, *places)};
-  if (!moving_) {
+  if (phase_ == Phase::idle) {
     names_ = message.names;
     places_ = *places;
-  } else if (config_.motion_enabled && (message.names != names_ || !is_ours(*setpoint_) || goes_back(*setpoint_))) {
+  } else if (config_.motion_enabled && (message.names != names_ || !is_ours(*setpoint_))) {
     on_foreign_command(arrival_s);
   }
+  watch_rest(arrival_s);
   watch(arrival_s);
 }
 
@@ -113,36 +156,30 @@ void Interlock::on_foreign_command(double arrival_s) {
   watch(arrival_s);
 }
 
-// An arm that follows the setpoints does not go back to one that it has passed: what it reports then is of another
-// program, whose commands alternate with ours.
-bool Interlock::goes_back(const Reading& setpoint) {
-  std::optional<double> first_s, last_s;
-  for (const Sent& sent : sent_) {
-    if (((sent.q - setpoint.q).array().abs() > same_place.array()).any()) continue;
-    if (!first_s) first_s = sent.time_s;
-    last_s = sent.time_s;
-  }
-  if (!first_s) return false;
-  if (*last_s < passed_s_) return true;
-  passed_s_ = std::max(passed_s_, *first_s);
-  return false;
+// The arm may be late, round, and go straight from where it is to the next setpoint that it gets.
+bool Interlock::is_ours(const Reading& setpoint) const {
+  bool ours = lies_between(setpoint.q, last_, last_);
+  for (std::size_t i = 0; i + 1 < sent_.size() && !ours; ++i)
+    ours = setpoint.time_s - sent_[i + 1].time_s <= memory_s && lies_between(setpoint.q, sent_[i].q, sent_[i + 1].q);
+  for (std::size_t i = 0; i < others_.size() && ours; ++i)
+    ours = std::find(places_.begin(), places_.end(), i) != places_.end() ||
+           std::abs(setpoint.positions[i] - others_[i]) <= same_other;
+  return ours;
 }
 
-// Between those that were sent of late: the arm may interpolate, and what comes back is from a moment ago.
-bool Interlock::is_ours(const Reading& setpoint) const {
-  Eigen::Vector4d lower = last_, upper = last_;
-  for (const Sent& sent : sent_) {
-    if (setpoint.time_s - sent.time_s > memory_s) continue;
-    lower = lower.cwiseMin(sent.q);
-    upper = upper.cwiseMax(sent.q);
-  }
-  if (((setpoint.q - upper - same_q).array() > 0).any() || ((lower - same_q - setpoint.q).array() > 0).any())
-    return false;
-  for (std::size_t i = 0; i < others_.size(); ++i)
-    if (std::find(places_.begin(), places_.end(), i) == places_.end() &&
-        std::abs(setpoint.positions[i] - others_[i]) > same_other)
-      return false;
-  return true;
+// Somebody may move the arm in its own program, which publishes no command then.
+void Interlock::watch_rest(double now_s) {
+  const auto is_new = [&](const std::optional<Reading>& one) {
+    return one && now_s - one->arrival_s < config_.max_age_s;
+  };
+  if (!is_new(measured_) || !is_new(setpoint_)) return rest_.reset();
+  if (phase_ != Phase::idle || (!sent_.empty() && now_s - sent_.back().time_s < settling_s)) return rest_.reset();
+  const auto left = [](const Eigen::Vector4d& now, const Eigen::Vector4d& then) {
+    return ((now - then).array().abs() > same_q.array()).any();
+  };
+  const bool moved = rest_ && (left(measured_->q, rest_->measured) || left(setpoint_->q, rest_->setpoint));
+  if (moved) moved_s_ = now_s;
+  if (!rest_ || moved || now_s - rest_->since_s > rest_s) rest_ = Rest{now_s, measured_->q, setpoint_->q};
 }
 
 void Interlock::follow(const JointPath& path) {
@@ -166,22 +203,29 @@ Blocked Interlock::blocked(double now_s) const {
   if (!operating_state_) return Blocked::no_operating_state;
   if (!setpoint_ || now_s - setpoint_->time_s > config_.max_age_s) return Blocked::no_setpoint;
   if (config_.motion_enabled && readers_ == 0u) return Blocked::no_reader;
+  if (phase_ != Phase::idle) return Blocked::none;
+  if (config_.motion_enabled && moved_s_ && now_s - *moved_s_ < rest_s) return Blocked::moving;
   const Eigen::Array4d distance = (setpoint_->q - measured_->q).array().abs();
-  return !moving_ && (distance > config_.max_distance.array()).any() ? Blocked::far_from_setpoint : Blocked::none;
+  return (distance > config_.max_distance.array()).any() ? Blocked::far_from_setpoint : Blocked::none;
 }
 
 void Interlock::watch(double now_s) {
   const Blocked why = blocked(now_s);
+  if (phase_ == Phase::following && is_silence(why) && !silent_since_s_) silent_since_s_ = now_s, ++counts_.pauses;
+  if (!is_silence(why) && silent_since_s_) {
+    counts_.longest_pause_s = std::max(counts_.longest_pause_s, now_s - *silent_since_s_ + config_.max_age_s);
+    silent_since_s_.reset();
+  }
   if (why == Blocked::none) return;
   if (untold_ == Blocked::none || is_silence(untold_)) untold_ = why;
   blocked_s_ = now_s;
-  forget_path();
+  stop(why);
 }
 
-void Interlock::forget_path() {
-  moving_ = false;
+void Interlock::stop(Blocked why) {
   path_.reset();
-  sent_.clear();
+  continues_ = is_silence(why) && (continues_ || phase_ != Phase::idle);
+  if (phase_ != Phase::idle) phase_ = obeys(why) ? Phase::braking : Phase::idle;
 }
 
 JointState Interlock::state(double now_s) {
@@ -196,11 +240,14 @@ JointState Interlock::state(double now_s) {
 }
 
 void Interlock::start(double now_s) {
-  last_ = setpoint_->q;
+  if (phase_ == Phase::idle && !(continues_ && is_ours(*setpoint_))) {
+    last_ = setpoint_->q;
+    velocity_.setZero();
+    others_ = setpoint_->positions;
+    sent_.push_back({now_s, last_});
+  }
   shift_ = last_ - path_->at(now_s).position;
-  others_ = setpoint_->positions;
-  passed_s_ = now_s;
-  moving_ = true;
+  phase_ = Phase::following;
 }
 
 Eigen::Vector4d Interlock::within_limits(const Eigen::Vector4d& wanted) const {
@@ -222,37 +269,74 @@ std::vector<double> Interlock::velocities() const {
   return velocities;
 }
 
-// Where it is to be this period, as far as the limits allow; true when it is there.
-bool Interlock::approach(const Eigen::Vector4d& wanted) {
-  const Eigen::Vector4d step = config_.limits.rate * config_.period_s, away = within_limits(wanted) - last_;
-  const Eigen::Vector4d taken = away.cwiseMax(-step).cwiseMin(step);
-  last_ += taken;
-  velocity_ = taken / config_.period_s;
-  return taken == away;
+// The velocity over the coming period of a joint that is `away` from its path: at rest exactly onto it, else with the
+// path and nearer to it.
+double Interlock::next_velocity(Eigen::Index joint, double away, double path_velocity) const {
+  const double rate = config_.limits.rate[joint], change = config_.limits.acceleration[joint] * config_.period_s;
+  const double exact = away / config_.period_s, before = velocity_[joint];
+  if (path_velocity == 0 && std::abs(exact) <= change && std::abs(exact - before) <= change) return exact;
+  const double behind = away - path_velocity * config_.period_s;
+  const double closing = approach_speed(std::abs(behind), config_.limits.acceleration[joint]);
+  const JointLimits& limits = config_.limits;
+  const double up = approach_speed(std::max(0.0, limits.upper[joint] - last_[joint]), limits.acceleration[joint]);
+  const double down = approach_speed(std::max(0.0, last_[joint] - limits.lower[joint]), limits.acceleration[joint]);
+  const double wanted =
+      std::clamp(path_velocity + std::copysign(closing, behind), -std::min(rate, down), std::min(rate, up));
+  return std::clamp(wanted, before - change, before + change);
 }
 
-std::optional<std::vector<double>> Interlock::tick(double now_s) {
-  watch(now_s);
-  if (path_ && !path_->at(now_s).position.allFinite()) forget_path();
-  if (!path_) return std::nullopt;
-  // While the arm could not be moved by us it may have been by others.
-  if (!moving_ && !(setpoint_->arrival_s > blocked_s_)) return std::nullopt;
-  if (!moving_) start(now_s);
-  const MotionState motion = path_->at(now_s);
-  const bool there = approach(motion.position + shift_);
-  if (there && motion.velocity.isZero()) velocity_.setZero();
+// Where it is to be this period, as far as the limits allow; true when it rests there.
+bool Interlock::approach(const MotionState& wanted) {
+  const Eigen::Vector4d position = wanted.position + shift_, within = within_limits(position);
+  for (Eigen::Index i = 0; i < 4; ++i)
+    velocity_[i] = next_velocity(i, within[i] - last_[i], within[i] == position[i] ? wanted.velocity[i] : 0);
+  const Eigen::Vector4d reached = within_limits(last_ + config_.period_s * velocity_);
+  velocity_ = (reached - last_) / config_.period_s;
+  last_ = reached;
+  return wanted.velocity.isZero() && (last_ - within).cwiseAbs().maxCoeff() < 1e-12;
+}
+
+std::optional<std::vector<double>> Interlock::send(double now_s) {
   if (!last_.allFinite()) {
     untold_ = Blocked::non_finite_joints;
     blocked_s_ = now_s;
-    forget_path();
+    path_.reset();
+    phase_ = Phase::idle;
     return std::nullopt;
   }
   sent_.push_back({now_s, last_});
   while (now_s - sent_.front().time_s > memory_s + config_.max_age_s) sent_.pop_front();
-  const std::vector<double> positions = all_joints();
-  if (released_ && there && motion.velocity.isZero()) forget_path();
   ++(config_.motion_enabled ? counts_.set_points : counts_.withheld);
-  return config_.motion_enabled ? std::optional(positions) : std::nullopt;
+  return config_.motion_enabled ? std::optional(all_joints()) : std::nullopt;
+}
+
+void Interlock::on_suspended(double now_s) {
+  untold_ = Blocked::loop_late;
+  blocked_s_ = now_s;
+  stop(Blocked::loop_late);
+}
+
+std::optional<std::vector<double>> Interlock::tick(double now_s) {
+  // An arm that nobody watched may be elsewhere: it is not even braked.
+  if (now_s - std::exchange(ticked_s_, now_s).value_or(now_s) > silence_s) on_suspended(now_s);
+  watch(now_s);
+  if (path_ && !path_->at(now_s).position.allFinite()) stop(Blocked::non_finite_joints);
+  if (phase_ == Phase::braking && !path_) {
+    velocity_ = brake(config_.limits, velocity_, config_.period_s);
+    last_ += config_.period_s * velocity_;
+    if (velocity_.isZero()) phase_ = Phase::idle;
+    return send(now_s);
+  }
+  if (!path_) return std::nullopt;
+  // While the arm could not be moved by us it may have been by others.
+  if (phase_ == Phase::idle && !(setpoint_->arrival_s > blocked_s_)) return std::nullopt;
+  if (phase_ != Phase::following) start(now_s);
+  const MotionState motion = path_->at(now_s);
+  const bool rests = approach(motion);
+  if (rests) velocity_.setZero();
+  auto sent = send(now_s);
+  if (released_ && rests) path_.reset(), phase_ = Phase::idle;
+  return sent;
 }
 
 }  // namespace lapservo::internal

@@ -38,17 +38,23 @@ struct InterlockCounts {
   long malformed = 0;                     ///< wrong length, missing names, absurd sizes
   long repeated = 0, late = 0, jumped = 0, unstamped = 0;
   long withheld = 0;  ///< setpoints that would have been sent, but for motion_enabled
+  long pauses = 0;    ///< times that the arm was silent for longer than max_age_s while it moved
+  double longest_pause_s = 0;
 };
 
 /// Turns a path into the setpoints of a CRTK arm, and reports when the arm is not ready for them. It uses only messages
 /// and times that it receives: no clock, no thread, no transport. An arm is ready while its joint states arrive, finite
-/// and freshly stamped, it is ENABLED, homed and not busy, no other program commands it, and its setpoints have
-/// as many readers as are allowed. Motion starts at the arm's
-/// own setpoint, to which a path's start is moved; each setpoint differs from the previous one by a period's rate limit
-/// at most and lies within the limits (or nearer to them than before). Joints beyond the four stay at their setpoint of
-/// the start. A topic belongs to its first sender: messages of another one are not used before the arm has fallen
-/// silent. As soon as the arm is not ready the path is dropped and nothing is sent; state() reports it, however short
-/// it was, and no new path is followed before.
+/// and freshly stamped, it is ENABLED, homed and not busy, no other program commands it, it does not move by itself,
+/// and its setpoints have as many readers as are allowed.
+///
+/// Motion starts at the arm's own setpoint, to which a path's start is moved. Setpoints keep to the limits of position
+/// (or come nearer to them), rate and acceleration, from one period to the next, whatever the path does and however
+/// late a period is. Joints beyond the four stay at their setpoint of the start. As soon as the arm is not ready the
+/// path is dropped: an arm that does not obey gets nothing more, one that still listens is braked to rest first.
+/// state() reports the reason, however short it was, and no new path is followed before.
+///
+/// A topic belongs to its first sender: messages of another one are not used before the arm has fallen silent. Then it
+/// is another arm, of which nothing is known yet.
 class Interlock {
  public:
   explicit Interlock(const InterlockConfig& config);
@@ -59,6 +65,8 @@ class Interlock {
   void on_operating_state(const OperatingStateMessage& message, double arrival_s);
   /// So many nodes read the setpoints.
   void on_readers(std::size_t count) { readers_ = count; }
+  /// The computer was suspended: the arm may be anywhere.
+  void on_suspended(double now_s);
   /// Another program sends setpoints to this arm.
   void on_foreign_command(double arrival_s);
 
@@ -80,7 +88,9 @@ class Interlock {
   /// Names of the arm's joints, as in its setpoints.
   const std::vector<std::string>& names() const { return names_; }
   /// The setpoint of theta, phi, rho, psi that was sent last, or withheld; nullopt while none is wanted.
-  std::optional<Eigen::Vector4d> set_point() const { return moving_ ? std::optional(last_) : std::nullopt; }
+  std::optional<Eigen::Vector4d> set_point() const {
+    return phase_ != Phase::idle ? std::optional(last_) : std::nullopt;
+  }
   const InterlockCounts& counts() const { return counts_; }
 
  private:
@@ -102,12 +112,15 @@ class Interlock {
   Eigen::Vector4d q_of(const JointMessage& message, const Places& places) const;
   Blocked blocked(double now_s) const;
   void watch(double now_s);
-  void forget_path();
+  void stop(Blocked why);
+  void begin_anew(double arrival_s);
+  void watch_rest(double now_s);
   void start(double now_s);
   bool is_ours(const Reading& setpoint) const;
-  bool goes_back(const Reading& setpoint);
   Eigen::Vector4d within_limits(const Eigen::Vector4d& wanted) const;
-  bool approach(const Eigen::Vector4d& wanted);
+  double next_velocity(Eigen::Index joint, double away, double path_velocity) const;
+  bool approach(const MotionState& wanted);
+  std::optional<std::vector<double>> send(double now_s);
   std::vector<double> all_joints() const;
 
   InterlockConfig config_;
@@ -126,14 +139,25 @@ class Interlock {
   std::vector<std::string> names_;
   Places places_{};
 
+  enum class Phase { idle, following, braking };
+  Phase phase_ = Phase::idle;
   std::optional<JointPath> path_;
-  bool released_ = false, moving_ = false;
-  double blocked_s_ = 0;  // when something was amiss last
+  bool released_ = false;
+  bool continues_ = false;  ///< from what was sent last: it was silent only
+  std::optional<double> ticked_s_;
+  double blocked_s_ = 0;                  // when something was amiss last
+  std::optional<double> silent_since_s_;  // of an arm that moved
   Eigen::Vector4d shift_ = Eigen::Vector4d::Zero(), last_ = Eigen::Vector4d::Zero(),
                   velocity_ = Eigen::Vector4d::Zero();
   std::vector<double> others_;  // all joints' setpoints at the start
-  std::deque<Sent> sent_;
-  double passed_s_ = 0;  // setpoints that were sent before this time are behind the arm, by its reports
+  std::deque<Sent> sent_;       // of the last second
+  /// Where an arm was that we do not move, from when on, and when it left such a place last.
+  struct Rest {
+    double since_s = 0;
+    Eigen::Vector4d measured = Eigen::Vector4d::Zero(), setpoint = Eigen::Vector4d::Zero();
+  };
+  std::optional<Rest> rest_;
+  std::optional<double> moved_s_;
 };
 
 }  // namespace lapservo::internal

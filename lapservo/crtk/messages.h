@@ -43,6 +43,7 @@ struct OperatingStateMessage {
 struct StringMessage {
   double stamp_s = 0;
   std::string text;
+  std::uint64_t source = 0;  ///< as in JointMessage
 };
 
 /// A command of motion, of which only the arrival counts.

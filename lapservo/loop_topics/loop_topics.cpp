@@ -4,11 +4,13 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <sstream>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "lapservo/core/error.h"
+#include "lapservo/core/lower_case.h"
 #include "lapservo/io/overlay.h"
 #include "lapservo/io/pictures/jpeg_encoding.h"
 #include "lapservo/robot/steady_clock.h"
@@ -17,6 +19,10 @@ namespace lapservo::internal {
 namespace {
 
 constexpr double between_states_s = 1, between_drawings_s = 0.1;
+// A start is repeated when one came so long before: `ros2 topic pub` says it once a second, about.
+constexpr double repeated_s = 1.5;
+constexpr std::size_t most_remarks = 3;  // a tick
+constexpr double never = -std::numeric_limits<double>::infinity();
 constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 
 std::vector<std::string> feature_names() {
@@ -30,6 +36,21 @@ std::array<double, N> rows_of(const Matrix& matrix) {
     for (Eigen::Index j = 0; j < matrix.cols(); ++j)
       values[static_cast<std::size_t>(i * matrix.cols() + j)] = matrix(i, j);
   return values;
+}
+
+// Lower case, one blank between words.
+std::string plain_words(const std::string& text) {
+  std::istringstream words(lower_case(text));
+  std::string plain;
+  for (std::string word; words >> word;) plain += (plain.empty() ? "" : " ") + word;
+  return plain;
+}
+
+std::string printable(const std::string& text) {
+  constexpr std::size_t longest = 40;
+  std::string shown = text.substr(0, longest);
+  for (char& c : shown) c = c >= ' ' && c <= '~' ? c : '?';
+  return shown;
 }
 
 std::string topic(const Rig& rig, const std::string& name) {
@@ -91,8 +112,14 @@ LoopTopics::LoopTopics(Transport& transport, const Rig& rig, const std::string& 
       desired_(transport.joint_publisher(topic(rig, "desired"))),
       error_(transport.joint_publisher(topic(rig, "error"))),
       diagnostics_(transport.diagnostic_publisher("/diagnostics")),
-      overlay_(transport.compressed_image_publisher(topic(rig, "overlay/compressed"))) {
+      overlay_(transport.compressed_image_publisher(topic(rig, "overlay/compressed"))),
+      started_s_{never, never},
+      other_loop_s_(never) {
   thread_ = std::thread([this] { draw(); });
+  subscriptions_.push_back(transport.subscribe_joints(topic(rig, "desired"), [this](JointMessage&&) {
+    const std::lock_guard lock(mutex_);
+    other_loop_s_ = SteadyClock().now_s();
+  }));
   if (!hears) return;
   subscriptions_.push_back(
       transport.subscribe_strings(topic(rig, "command"), [this](StringMessage&& command) { hear(command); }));
@@ -186,15 +213,31 @@ void LoopTopics::publish_state(const ControlTick& tick, const std::string& state
 }
 
 void LoopTopics::hear(const StringMessage& command) {
+  const std::string words = plain_words(command.text);
   const std::lock_guard lock(mutex_);
-  const bool force = command.text == "start force";
-  if (force || command.text == "start") {
-    wishes_.start = LoopWishes::Start{SteadyClock().now_s(), force};
-  } else if (command.text == "stop") {
-    wishes_.stop = true;
+  if (words == "start" || words == "start force") return hear_start(command, words != "start");
+  wishes_.stops.insert(command.source);
+  if (words == "stop") return;
+  ++malformed_;
+  if (wishes_.remarks.size() < most_remarks)
+    wishes_.remarks.insert(fmt::format("stopped by the unknown command '{}': expected start, start force or stop",
+                                       printable(command.text)));
+}
+
+void LoopTopics::hear_start(const StringMessage& command, bool force) {
+  const double now_s = SteadyClock().now_s();
+  const double before_s = std::exchange(started_s_.at(force ? 1 : 0), now_s);
+  if (now_s - before_s > repeated_s) {
+    wishes_.starts.push_back({now_s, force, command.source});
   } else {
-    ++malformed_;
+    wishes_.remarks.emplace("a start that is repeated does not count: say it once (ros2 topic pub --once)");
   }
+}
+
+bool LoopTopics::name_is_in_use() const {
+  constexpr double lasts_s = 1;
+  const std::lock_guard lock(mutex_);
+  return SteadyClock().now_s() - other_loop_s_ < lasts_s;
 }
 
 void LoopTopics::hear(const JointMessage& set_point) {

@@ -1,7 +1,10 @@
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <thread>
 #include <vector>
@@ -19,11 +22,13 @@ namespace lapservo::internal {
 /// Commands of other programs to the loop.
 struct LoopWishes {
   struct Start {
-    double said_s = 0;   ///< when it came, on SteadyClock
-    bool force = false;  ///< whoever holds
+    double said_s = 0;         ///< when it came, on SteadyClock
+    bool force = false;        ///< whoever holds
+    std::uint64_t source = 0;  ///< who said it
   };
-  bool stop = false;
-  std::optional<Start> start;                ///< the last one
+  std::set<std::uint64_t> stops;  ///< who said them
+  std::vector<Start> starts;
+  std::set<std::string> remarks;             ///< on what did not count, in words
   std::optional<Eigen::Vector4d> set_point;  ///< s_rad, r_px, l_px, d_px
   std::optional<Trajectory> trajectory;      ///< of time since it is begun; of this and set_point the last
 };
@@ -33,8 +38,9 @@ struct LoopWishes {
 /// camera_from_rcm is known) of every image; /lapservo/NAME/desired and /lapservo/NAME/error (JointState: s_rad, r_px,
 /// l_px, d_px) every tick; /diagnostics (DiagnosticArray) once a second and when something changes;
 /// /lapservo/NAME/overlay/compressed, drawn in a thread of its own, at most ten a second. It hears
-/// /lapservo/NAME/command (StringStamped: start, start force, stop), /lapservo/NAME/set_point (JointState: s_rad, r_px,
-/// l_px, d_px) and /lapservo/NAME/trajectory (JointTrajectory of these).
+/// /lapservo/NAME/command (StringStamped: start, start force; any other word stops), /lapservo/NAME/set_point
+/// (JointState: s_rad, r_px, l_px, d_px) and /lapservo/NAME/trajectory (JointTrajectory of these). A start that is
+/// repeated counts once: it would start the arm by itself after each hold.
 class LoopTopics {
  public:
   /// `hears`: whether it hears anything; else it only publishes.
@@ -43,6 +49,8 @@ class LoopTopics {
 
   /// `state`: the loop's, in words; empty where it tracks.
   void publish(const ControlTick& tick, const std::string& state);
+  /// Whether another loop has published as NAME in the last second: it would obey the same commands.
+  bool name_is_in_use() const;
   /// Messages since the last call. Invalid messages are dropped and counted.
   LoopWishes wishes();
   long malformed() const;
@@ -52,6 +60,7 @@ class LoopTopics {
   void publish_observation(const ControlTick& tick, double stamp_s);
   void publish_state(const ControlTick& tick, const std::string& state, double stamp_s);
   void hear(const StringMessage& command);
+  void hear_start(const StringMessage& command, bool force);
   void hear(const JointMessage& set_point);
   void hear(const TrajectoryMessage& trajectory);
   void draw();
@@ -76,6 +85,8 @@ class LoopTopics {
   mutable std::mutex mutex_;
   LoopWishes wishes_;
   long malformed_ = 0;
+  std::array<double, 2> started_s_;  ///< when start, and start force, came last
+  double other_loop_s_;              ///< when another one of this name published last
   BoundedQueue<Drawing> to_draw_{1};
   double next_drawing_s_ = 0;
   std::vector<Transport::Subscription> subscriptions_;

@@ -1,6 +1,9 @@
 #include "lapservo/loop_topics/loop_topics.h"
 
+#include <chrono>
 #include <cmath>
+#include <set>
+#include <thread>
 
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
@@ -116,13 +119,16 @@ TEST(LoopTopics, HearsCommandsAndDropsWhatMakesNoSense) {
   const double begin_s = SteadyClock().now_s();
   for (const char* text : {"start", "stop"}) transport.say("/lapservo/PSM1/command", StringMessage{0, text});
   const LoopWishes both = topics.wishes();
-  ASSERT_TRUE(both.stop && both.start);
-  EXPECT_GE(both.start->said_s, begin_s);
-  EXPECT_FALSE(both.start->force);
-  transport.say("/lapservo/PSM1/command", StringMessage{0, "start force"});
-  EXPECT_TRUE(topics.wishes().start.value().force);
-  EXPECT_FALSE(topics.wishes().stop || topics.wishes().start);
-  transport.say("/lapservo/PSM1/command", StringMessage{0, "explode"});
+  ASSERT_TRUE(both.stops.size() == 1 && both.starts.size() == 1);
+  EXPECT_GE(both.starts[0].said_s, begin_s);
+  EXPECT_FALSE(both.starts[0].force);
+  transport.say("/lapservo/PSM1/command", StringMessage{0, " Start  FORCE\n", 7});
+  const LoopWishes forced = topics.wishes();
+  ASSERT_EQ(forced.starts.size(), 1u);
+  EXPECT_TRUE(forced.starts[0].force);
+  EXPECT_EQ(forced.starts[0].source, 7u);
+  const LoopWishes none = topics.wishes();
+  EXPECT_TRUE(none.stops.empty() && none.starts.empty());
   const std::vector<std::string> names{"s_rad", "r_px", "l_px", "d_px"};
   transport.say("/lapservo/PSM1/set_point", JointMessage{0, names, {0.9, 400, 180, 100}});
   transport.say("/lapservo/PSM1/set_point", JointMessage{0, names, {0.9, NAN, 180, 100}});
@@ -131,14 +137,60 @@ TEST(LoopTopics, HearsCommandsAndDropsWhatMakesNoSense) {
   const LoopWishes wishes = topics.wishes();
   ASSERT_TRUE(wishes.set_point);
   EXPECT_EQ(*wishes.set_point, Eigen::Vector4d(0.9, 400, 180, 100));
-  EXPECT_EQ(topics.malformed(), 4);
+  EXPECT_EQ(topics.malformed(), 3);
+}
+
+// A person in a hurry writes what comes to mind.
+TEST(LoopTopics, AnyWordButStartStops) {
+  TestTransport transport;
+  LoopTopics topics(transport, testing::small_test_rig(), "endoscope");
+  for (const char* text : {"stop", "STOP", " stop ", "Stop\n"}) {
+    transport.say("/lapservo/PSM1/command", StringMessage{0, text, 3});
+    const LoopWishes wishes = topics.wishes();
+    EXPECT_EQ(wishes.stops, std::set<std::uint64_t>{3}) << text;
+    EXPECT_TRUE(wishes.remarks.empty()) << text;
+  }
+  for (const char* text : {"hold", "halt!", "", "starts", "start now", "\x01\xff"}) {
+    transport.say("/lapservo/PSM1/command", StringMessage{0, text, 3});
+    const LoopWishes wishes = topics.wishes();
+    EXPECT_EQ(wishes.stops, std::set<std::uint64_t>{3}) << text;
+    ASSERT_EQ(wishes.remarks.size(), 1u) << text;
+    EXPECT_NE(wishes.remarks.begin()->find("expected start, start force or stop"), std::string::npos);
+  }
+}
+
+// `ros2 topic pub` repeats once a second; a start that stands would start the arm after each hold.
+TEST(LoopTopics, AStartThatIsRepeatedCountsOnce) {
+  TestTransport transport;
+  LoopTopics topics(transport, testing::small_test_rig(), "endoscope");
+  std::size_t starts = 0, remarks = 0;
+  for (int k = 0; k < 30; ++k) {
+    transport.say("/lapservo/PSM1/command", StringMessage{0, "start", static_cast<std::uint64_t>(k % 2)});
+    const LoopWishes wishes = topics.wishes();
+    starts += wishes.starts.size(), remarks += wishes.remarks.size();
+    std::this_thread::sleep_for(std::chrono::milliseconds(60));
+  }
+  EXPECT_EQ(starts, 1u);
+  EXPECT_EQ(remarks, 29u);
+  std::this_thread::sleep_for(std::chrono::milliseconds(1600));
+  transport.say("/lapservo/PSM1/command", StringMessage{0, "start"});
+  EXPECT_EQ(topics.wishes().starts.size(), 1u);
+}
+
+TEST(LoopTopics, KnowsAnotherLoopOfItsName) {
+  TestTransport transport;
+  LoopTopics topics(transport, testing::small_test_rig(), "endoscope", false);
+  topics.publish(tick_of(testing::small_test_rig()), "");
+  EXPECT_FALSE(topics.name_is_in_use());
+  transport.say("/lapservo/PSM1/desired", JointMessage{});
+  EXPECT_TRUE(topics.name_is_in_use());
 }
 
 TEST(LoopTopics, HearsNothingWhereNobodyMayCommand) {
   TestTransport transport;
   LoopTopics topics(transport, testing::small_test_rig(), "endoscope", false);
   transport.say("/lapservo/PSM1/command", StringMessage{0, "start"});
-  EXPECT_FALSE(topics.wishes().start);
+  EXPECT_TRUE(topics.wishes().starts.empty());
 }
 
 TEST(LoopTopics, HearsTrajectories) {

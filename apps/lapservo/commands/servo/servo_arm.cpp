@@ -6,6 +6,7 @@
 #include <future>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <thread>
 #include <utility>
@@ -40,6 +41,11 @@ std::string list_of(const Joints& joints, const Eigen::Vector4d& q) {
   std::string text;
   for (int i = 0; i < 4; ++i) text += fmt::format("{}{} {:.4f}", i ? ", " : "", joints.names[i], positions[i]);
   return text;
+}
+
+std::string name_in_use(const Rig& rig) {
+  return fmt::format("another loop runs as {}: end it, or give this rig's instrument another name",
+                     rig.instruments.front().name);
 }
 
 // The trajectory, until somebody wants a setpoint instead. All in the loop's thread.
@@ -85,6 +91,10 @@ class ArmWatcher : public RunObserver {
     obey(topics_.wishes(), tick, time_s);
     if (!options_.enable_motion) say_what_would_be_sent(time_s);
     if (page_ && obey_page(tick, time_s)) return false;
+    if (topics_.name_is_in_use()) {
+      say(time_s, "end: " + name_in_use(run_.rig));
+      return false;
+    }
     if (options_.strict && summary_.registration_contradicted()) return false;
     return !interrupted();
   }
@@ -104,8 +114,12 @@ class ArmWatcher : public RunObserver {
     say(time_s, state);
   }
   void obey(const LoopWishes& wishes, const ControlTick& tick, double time_s) {
-    if (wishes.stop) arm_.stop(Commander::topic);
-    if (wishes.start) arm_.start(Commander::topic, wishes.start->said_s, wishes.start->force);
+    for (const std::uint64_t source : wishes.stops) arm_.stop({Commander::topic, source});
+    for (const LoopWishes::Start& start : wishes.starts)
+      arm_.start({Commander::topic, start.source}, start.said_s, start.force);
+    constexpr std::size_t most_said = 100;
+    for (const std::string& remark : wishes.remarks)
+      if (said_remarks_.size() < most_said && said_remarks_.insert(remark).second) say(time_s, remark);
     if (wishes.set_point) wanted_ = Wanted{"set_point", 1, set_point(*wishes.set_point)};
     if (wishes.trajectory) wanted_ = Wanted{"trajectory", wishes.trajectory->duration_s, *wishes.trajectory};
     const ServoDecision& decision = tick.decision;
@@ -178,6 +192,7 @@ class ArmWatcher : public RunObserver {
   std::optional<double> start_s_;
   double next_counts_s_ = 0, next_set_point_s_ = 0;
   std::string state_, said_counts_;
+  std::set<std::string> said_remarks_;
   bool said_ended_ = false;
   std::size_t said_motions_ = 0;
   std::future<std::string> refusal_;  // of the checked goal, empty when it can be followed; last: it uses the others
@@ -225,6 +240,8 @@ void say_counts(const InterlockCounts& arm, const ImageCounts& images) {
   std::printf("%ld joint states; setpoints: %ld sent, %ld withheld; dropped: %ld malformed, %ld repeated, %ld late, ",
               arm.joint_states, arm.set_points, arm.withheld, arm.malformed, arm.repeated, arm.late);
   std::printf("%ld after a jump of the clock, %ld without a stamp\n", arm.jumped, arm.unstamped);
+  if (arm.pauses > 0)
+    std::printf("the arm was silent %ld times while it moved, for up to %.2f s\n", arm.pauses, arm.longest_pause_s);
   std::printf("%ld images%s%s\n", images.taken, images.text().empty() ? "" : "; ", images.text().c_str());
 }
 
@@ -257,10 +274,13 @@ int steer_arm(const ServoOptions& options) {
     operator_presence.emplace(transport, options.operator_present, clock);
     arm.watch_operator([&] { return operator_presence->was_present(); });
   }
+  // Before the arm is heard, so that another loop of this name is.
+  LoopTopics topics(transport, rig, "endoscope", may_command(options, "topics"));
   watch_for_interrupts();
   ServoPage* const its_page = page ? &*page : nullptr;
   const std::string missing = wait_for_topics(options, transports, arm, its_page, clock);
   if (page && page->command(arm, clock.now_s())) return end_by_page();
+  if (topics.name_is_in_use()) throw InputError("--rig", name_in_use(rig));
   if (!missing.empty()) {
     std::fprintf(stderr, "lapservo: %s\n", missing.c_str());
     return 1;
@@ -270,7 +290,6 @@ int steer_arm(const ServoOptions& options) {
   std::optional<RunFolder> folder;
   if (!options.out.empty()) folder.emplace(options, duration_s(options), rig, config.controller);
 
-  LoopTopics topics(transport, rig, "endoscope", may_command(options, "topics"));
   Goal goal(trajectory);
   ArmWatcher watcher(options, config, arm, robot, images, topics, goal, folder ? &*folder : nullptr, its_page);
   if (page && page->command(arm, clock.now_s())) return end_by_page();
