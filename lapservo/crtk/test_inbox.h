@@ -28,7 +28,10 @@ class TestInbox {
     const std::lock_guard lock(mutex_);
     return messages_;
   }
-  std::size_t count() { return all().size(); }
+  std::size_t count() {
+    const std::lock_guard lock(mutex_);
+    return messages_.size();
+  }
   bool empty() { return count() == 0; }
   void clear() {
     const std::lock_guard lock(mutex_);

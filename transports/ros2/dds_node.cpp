@@ -275,8 +275,10 @@ dds_entity_t DdsNode::create_writer(const std::string& topic, const dds_topic_de
   return writer;
 }
 
-dds_entity_t DdsNode::create_reader(const std::string& topic, const dds_topic_descriptor_t& type, Delivery delivery) {
+dds_entity_t DdsNode::create_reader(const std::string& topic, const dds_topic_descriptor_t& type, Delivery delivery,
+                                    std::optional<int> depth) {
   const Qos qos = qos_of(delivery);
+  if (depth) dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, *depth);
   dds_qset_ignorelocal(qos.get(), DDS_IGNORELOCAL_PARTICIPANT);
   const dds_entity_t on = create_topic(dds_topic_name(topic), type);
   const std::lock_guard lock(mutex_);

@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -32,8 +33,10 @@ class DdsNode {
 
   /// `topic` as in ROS.
   dds_entity_t create_writer(const std::string& topic, const dds_topic_descriptor_t& type, Delivery delivery);
-  /// Without what this node's own writers send.
-  dds_entity_t create_reader(const std::string& topic, const dds_topic_descriptor_t& type, Delivery delivery);
+  /// Without what this node's own writers send. `depth`: messages that it keeps until they are taken, of all writers;
+  /// without it as many as its delivery says.
+  dds_entity_t create_reader(const std::string& topic, const dds_topic_descriptor_t& type, Delivery delivery,
+                             std::optional<int> depth = std::nullopt);
   /// Statistics of a reader or writer.
   void remove(dds_entity_t entity);
 

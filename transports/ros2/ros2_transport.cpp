@@ -1,14 +1,9 @@
 #include "transports/ros2/ros2_transport.h"
 
-#include <algorithm>
-#include <array>
-#include <cstdio>
 #include <cstdlib>
-#include <deque>
 #include <functional>
 #include <map>
 #include <set>
-#include <thread>
 #include <type_traits>
 #include <utility>
 #include <variant>
@@ -16,6 +11,7 @@
 
 #include "lapservo/core/wall_clock.h"
 #include "transports/ros2/dds_node.h"
+#include "transports/ros2/reading.h"
 #include "transports/ros2/ros2_names.h"
 #include "transports/ros2/wire.h"
 
@@ -25,38 +21,6 @@ namespace {
 std::uint32_t domain_of_environment() {
   const char* const id = std::getenv("ROS_DOMAIN_ID");
   return domain_id(id ? id : "");
-}
-
-// A writer's sample reaches readers of different QoS on separate ways: the first one counts. Its stamp identifies it,
-// but not its order: a writer's clock may be set.
-class Sieve {
- public:
-  bool is_new(const dds_sample_info_t& info, dds_entity_t reader) {
-    constexpr std::size_t remembered = 64;  // more than all readers hold
-    auto& last = last_[info.publication_handle];
-    for (const auto& [stamp, by] : last)
-      if (stamp == info.source_timestamp && by != reader) return false;
-    last.emplace_back(info.source_timestamp, reader);
-    if (last.size() > remembered) last.pop_front();
-    return true;
-  }
-
- private:
-  std::map<dds_instance_handle_t, std::deque<std::pair<dds_time_t, dds_entity_t>>> last_;
-};
-
-// Whether the reader has a publisher that keeps nothing for those who come later.
-bool has_volatile_publisher(dds_entity_t reader) {
-  std::array<dds_instance_handle_t, 16> writers{};
-  const int count = dds_get_matched_publications(reader, writers.data(), writers.size());
-  return std::any_of(writers.begin(), writers.begin() + std::clamp<int>(count, 0, writers.size()), [&](auto writer) {
-    dds_builtintopic_endpoint_t* const endpoint = dds_get_matched_publication_data(reader, writer);
-    if (!endpoint) return false;
-    dds_durability_kind_t kind = DDS_DURABILITY_TRANSIENT_LOCAL;
-    dds_qget_durability(endpoint->qos, &kind);
-    dds_builtintopic_free_endpoint(endpoint);
-    return kind == DDS_DURABILITY_VOLATILE;
-  });
 }
 
 // DDS matches each reader with the publishers of its type.
@@ -85,74 +49,12 @@ std::vector<Delivery> deliveries_of() {
   return {Delivery::best_effort};
 }
 
-// Readers of a topic with the thread that takes from them.
-class Reading {
- public:
-  using Taken = std::function<void(const void*, dds_instance_handle_t writer)>;
-  Reading(std::shared_ptr<DdsNode> node, const std::string& topic, const dds_topic_descriptor_t& type,
-          const std::vector<Delivery>& deliveries, Taken taken)
-      : node_(std::move(node)),
-        topic_(topic),
-        taken_(std::move(taken)),
-        awaited_(deliveries.front() == Delivery::latched),
-        waitset_(dds_create_waitset(node_->participant())) {
-    dds_waitset_attach(waitset_, waitset_, 0);
-    for (const Delivery delivery : deliveries) {
-      readers_.push_back(node_->create_reader(topic, type, delivery));
-      const dds_entity_t condition = dds_create_readcondition(readers_.back(), DDS_ANY_STATE);
-      dds_waitset_attach(waitset_, condition, 0);
-    }
-    thread_ = std::thread([this] { work(); });
-  }
-  ~Reading() {
-    dds_waitset_set_trigger(waitset_, true);
-    thread_.join();
-    dds_delete(waitset_);
-    for (const dds_entity_t reader : readers_) node_->remove(reader);
-  }
-
- private:
-  void work() {
-    while (true) {
-      const bool silent = dds_waitset_wait(waitset_, nullptr, 0, awaited_ ? patience : DDS_INFINITY) == 0;
-      if (dds_triggered(waitset_) > 0) return;
-      if (silent) look_for_silent_publisher();
-      for (const dds_entity_t reader : readers_) take(reader);
-    }
-  }
-  // A message that is sent once should reach later subscribers.
-  void look_for_silent_publisher() {
-    if (!has_volatile_publisher(readers_.back()) || ++silences_ < 2) return;  // the first may have just come
-    awaited_ = false;
-    std::fprintf(stderr,
-                 "DDS: %s: its publisher is volatile and has said nothing since: let it say it again, or latch it "
-                 "(transient local)\n",
-                 topic_.c_str());
-  }
-  void take(dds_entity_t reader) {
-    constexpr int at_once = 16;
-    std::array<void*, at_once> samples{};
-    std::array<dds_sample_info_t, at_once> infos;
-    const int count = dds_take(reader, samples.data(), infos.data(), at_once, at_once);
-    if (count <= 0) return;
-    awaited_ = false;
-    for (int i = 0; i < count; ++i)
-      if (infos[i].valid_data && sieve_.is_new(infos[i], reader)) taken_(samples[i], infos[i].publication_handle);
-    dds_return_loan(reader, samples.data(), count);
-  }
-
-  static constexpr dds_duration_t patience = DDS_SECS(1);
-
-  std::shared_ptr<DdsNode> node_;
-  std::string topic_;
-  Taken taken_;
-  bool awaited_;  // until the first message of a topic that is latched
-  int silences_ = 0;
-  dds_entity_t waitset_;
-  std::vector<dds_entity_t> readers_;
-  Sieve sieve_;
-  std::thread thread_;
-};
+// Messages of a topic that are kept until they are taken, of all its publishers.
+constexpr int few = 5, many = 100;
+template <typename Message>
+constexpr int depth_of() {
+  return std::is_same_v<Message, OperatingStateMessage> ? many : few;
+}
 
 }  // namespace
 
@@ -181,7 +83,7 @@ class Ros2Transport::Implementation {
       if constexpr (requires { message.source; }) message.source = writer;
       handler(std::move(message));
     };
-    return std::make_shared<Reading>(node_, topic, Wire<Message>::descriptor(), deliveries, taken);
+    return std::make_shared<Reading>(node_, topic, Wire<Message>::descriptor(), deliveries, depth_of<Message>(), taken);
   }
 
   Subscription subscribe_commands(const std::string& topic, CommandType type, const Handler<CommandMessage>& handler) {
@@ -189,7 +91,7 @@ class Ros2Transport::Implementation {
     auto readings = std::make_shared<std::vector<std::unique_ptr<Reading>>>();
     for (const dds_topic_descriptor_t* descriptor : types_of(type))
       readings->push_back(
-          std::make_unique<Reading>(node_, topic, *descriptor, std::vector{Delivery::best_effort}, taken));
+          std::make_unique<Reading>(node_, topic, *descriptor, std::vector{Delivery::best_effort}, few, taken));
     return readings;
   }
 

@@ -20,30 +20,13 @@
 #include "lapservo/testing/wait_for.h"
 #include "ros2_messages.h"
 #include "transports/ros2/dds_node.h"
-#include "transports/ros2/ros2_names.h"
+#include "transports/ros2/test_dds_peer.h"
 #include "transports/ros2/wire.h"
 
 namespace lapservo::internal {
 namespace {
 
 constexpr double stamp_s = sample_stamp_s;
-
-std::uint32_t test_domain() {
-  const char* const domain = std::getenv("ROS_DOMAIN_ID");
-  return domain_id(domain ? domain : "");
-}
-
-// A node as in another process: what passes between it and this process's others goes through sockets.
-std::unique_ptr<DdsNode> node_elsewhere() {
-  constexpr std::uint32_t handle = 300;  // of Cyclone DDS, for a second domain of the same number
-  const std::string number = std::to_string(test_domain());
-  const std::string outside = "<CycloneDDS><Domain><Discovery><ExternalDomainId>" + number +
-                              "</ExternalDomainId></Discovery></Domain></CycloneDDS>";
-  ::setenv("CYCLONEDDS_URI", outside.c_str(), 1);
-  auto node = std::make_unique<DdsNode>("elsewhere", handle);
-  ::unsetenv("CYCLONEDDS_URI");
-  return node;
-}
 
 TEST(Ros2Transport, CarriesEveryKindOfMessage) {
   Ros2Transport from("from"), to("to");

@@ -1,0 +1,114 @@
+#include "transports/ros2/reading.h"
+
+#include <chrono>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/crtk/test_inbox.h"
+#include "lapservo/testing/wait_for.h"
+#include "transports/ros2/ros2_transport.h"
+#include "transports/ros2/test_dds_peer.h"
+#include "transports/ros2/wire.h"
+
+namespace lapservo::internal {
+namespace reading_test {
+
+const std::string topic = "/PSM1/topic";
+
+OperatingStateMessage state(int number) {
+  return {0, std::to_string(number), true, false};
+}
+StringMessage text(int number) {
+  return {0, std::to_string(number)};
+}
+TrajectoryMessage trajectory(int number) {
+  return {0, {std::to_string(number)}, {}};
+}
+int number_of(const OperatingStateMessage& message) {
+  return std::stoi(message.state);
+}
+int number_of(const StringMessage& message) {
+  return std::stoi(message.text);
+}
+int number_of(const TrajectoryMessage& message) {
+  return std::stoi(message.names.at(0));
+}
+
+template <typename Message>
+std::vector<int> numbers_of(TestInbox<Message>& inbox) {
+  std::vector<int> numbers;
+  for (const Message& message : inbox.all()) numbers.push_back(number_of(message));
+  return numbers;
+}
+
+std::vector<int> range(int first, int last) {
+  std::vector<int> all;
+  for (int k = first; k <= last; ++k) all.push_back(k);
+  return all;
+}
+
+// Bursts of two to five messages by a writer of another participant, the next one when the last one came.
+template <typename Message>
+void expect_order(Delivery offered, auto subscribe, Message (*numbered)(int)) {
+  constexpr int bursts = 1000;
+  Ros2Transport to("to");
+  const auto from = node_elsewhere();
+  TestInbox<Message> heard;
+  const auto subscription = (to.*subscribe)(topic, heard.handler());
+  const dds_entity_t writer = from->create_writer(topic, Wire<Message>::descriptor(), offered);
+  heard.get([&] { Wire<Message>::write(writer, numbered(0)); });
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  heard.clear();
+  int said = 0;
+  std::size_t count = 0;
+  for (int burst = 0; burst < bursts; ++burst) {
+    const int size = 2 + burst % 4;
+    for (int k = 0; k < size; ++k) Wire<Message>::write(writer, numbered(++said));
+    count += static_cast<std::size_t>(size);
+    const auto end = std::chrono::steady_clock::now() + std::chrono::milliseconds(500);
+    while (heard.count() < count && std::chrono::steady_clock::now() < end)
+      std::this_thread::sleep_for(std::chrono::microseconds(50));
+    if (heard.count() < count) break;
+  }
+  std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  EXPECT_EQ(numbers_of(heard), range(1, bursts * 7 / 2)) << static_cast<int>(offered);
+}
+
+TEST(Reading, StatesComeOnceInTheirOrderByWhateverTheirPublisherOffers) {
+  for (const Delivery offered : {Delivery::latched, Delivery::reliable, Delivery::best_effort})
+    expect_order(offered, &Transport::subscribe_operating_state, state);
+}
+
+TEST(Reading, CommandsAndTrajectoriesComeOnceInTheirOrderByWhateverTheirPublisherOffers) {
+  for (const Delivery offered : {Delivery::latched, Delivery::reliable, Delivery::best_effort}) {
+    expect_order(offered, &Transport::subscribe_strings, text);
+    expect_order(offered, &Transport::subscribe_trajectories, trajectory);
+  }
+}
+
+// As of a program that says one thing and ends.
+TEST(Reading, WhatAWriterSaidBeforeItWentComesOnceInItsOrder) {
+  Ros2Transport to("to");
+  const auto from = node_elsewhere();
+  TestInbox<OperatingStateMessage> heard;
+  const auto subscription = to.subscribe_operating_state(topic, heard.handler());
+  const auto& type = Wire<OperatingStateMessage>::descriptor();
+  int said = 0;
+  for (int round = 0; round < 20; ++round) {
+    const dds_entity_t writer = from->create_writer(topic, type, Delivery::reliable);
+    ASSERT_TRUE(testing::wait_for([&] { return dds_get_matched_subscriptions(writer, nullptr, 0) == 2; }));
+    for (int k = 0; k < 2; ++k) Wire<OperatingStateMessage>::write(writer, state(++said));
+    from->remove(writer);
+  }
+  for (int k = 0; k < 100 && heard.count() < static_cast<std::size_t>(said); ++k)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  EXPECT_EQ(numbers_of(heard), range(1, said));
+}
+
+}  // namespace reading_test
+}  // namespace lapservo::internal
