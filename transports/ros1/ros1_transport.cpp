@@ -49,6 +49,14 @@ namespace {
 constexpr std::uint32_t few = 10;    // as ROS 2 keeps by default
 constexpr std::uint32_t newest = 2;  // of images
 
+// Messages of a topic that are kept until they are taken, of all its publishers: whoever floods it must not push
+// another one's out. 30,000 texts a second take longer than 0.1 s to do so.
+template <typename Message>
+constexpr std::uint32_t depth_of() {
+  if (std::is_same_v<Message, StringMessage>) return 5000;
+  return std::is_same_v<Message, OperatingStateMessage> ? 1000 : few;
+}
+
 std::string full_name(const std::string& topic) {
   return resolved_ros1_name(topic, ros1_namespace(), "topic");
 }
@@ -132,7 +140,7 @@ Transport::Publisher<JointMessage> Ros1Transport::set_point_publisher(const std:
 
 Transport::Subscription Ros1Transport::listen(const std::string& topic, const AnyHandler& handler) {
   const auto subscribe = [&]<typename Message>(const Handler<Message>& one) {
-    return subscription<Message>(node_, topic, is_image<Message> ? newest : few, one);
+    return subscription<Message>(node_, topic, is_image<Message> ? newest : depth_of<Message>(), one);
   };
   return std::visit(subscribe, handler);
 }

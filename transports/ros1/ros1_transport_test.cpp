@@ -129,6 +129,31 @@ TEST_F(Ros1Wire, NoTopicWaitsForAnother) {
   release = true;
 }
 
+// While the subscriber is kept busy.
+TEST_F(Ros1Wire, AStopIsHeardThoughAnotherFloodsItsTopic) {
+  const testing::Process flooder(LAPSERVO_ROS1_PEER, {"flooder"});
+  std::atomic<bool> release = false, found = false, stopped = false;
+  std::atomic<int> floods = 0;
+  const auto subscription = transport_->subscribe_strings("/out/text", [&](StringMessage&& message) {
+    if (message.text == "flooder") {
+      found = true;
+      while (!release) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    if (message.text == "stop") stopped = true;
+    if (message.text == "flood") ++floods;
+  });
+  const auto ask = transport_->string_publisher("/in/text");
+  ASSERT_TRUE(wait_for([&] {
+    ask({stamp_s, "who"});
+    return found.load();
+  }));
+  ask({stamp_s, "stop"});
+  ask({stamp_s, "flood"});
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  release = true;
+  EXPECT_TRUE(wait_for([&] { return stopped && floods > 100; }));
+}
+
 TEST_F(Ros1Wire, StrangersMessagesAreDroppedAndTold) {
   ::testing::internal::CaptureStderr();
   TestInbox<JointMessage> odd, pretended;

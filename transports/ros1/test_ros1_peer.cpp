@@ -1,8 +1,11 @@
-// The other process of ros1_transport_test: what comes on /in/X goes out on /out/X. A string may ask for more.
+// Another process of ros1_transport_test, a node of the name that is its argument or "peer": what comes on /in/X goes
+// out on /out/X. A string may ask for more.
 
+#include <chrono>
 #include <cstring>
 #include <ros/ros.h>
 #include <string>
+#include <thread>
 #include <unistd.h>
 #include <vector>
 
@@ -15,6 +18,14 @@ namespace {
 struct Pretender {
   std::vector<std::uint8_t> bytes;
 };
+
+// 1000 messages at 30,000 a second.
+void flood(const lapservo::internal::Transport::Publisher<lapservo::internal::StringMessage>& say) {
+  for (int k = 0; k < 1000; ++k) {
+    if (k % 10 == 0) std::this_thread::sleep_for(std::chrono::microseconds(333));
+    say({0, "flood"});
+  }
+}
 
 }  // namespace
 
@@ -56,9 +67,10 @@ struct Serializer<Pretender> {
 }  // namespace serialization
 }  // namespace ros
 
-int main() {
+int main(int argc, char** argv) {
   using namespace lapservo::internal;
-  Ros1Transport transport("peer");
+  const std::string name = argc > 1 ? argv[1] : "peer";
+  Ros1Transport transport(name);
   std::vector<Transport::Subscription> subscriptions;
   const auto echo = [&](const std::string& kind, auto publisher, auto subscribe) {
     const auto say = (transport.*publisher)("/out/" + kind);
@@ -83,6 +95,8 @@ int main() {
       pretender.publish(Pretender{std::vector<std::uint8_t>(40, 0xff)});
       pretender.publish(Pretender{});
     }
+    if (m.text == "flood" && name == "flooder") flood(text);
+    if (m.text == "who") m.text = name;
     text(m);
   }));
   while (ros::ok()) ::pause();

@@ -1,5 +1,6 @@
 #include "transports/ros2/reading.h"
 
+#include <atomic>
 #include <chrono>
 #include <string>
 #include <thread>
@@ -108,6 +109,32 @@ TEST(Reading, WhatAWriterSaidBeforeItWentComesOnceInItsOrder) {
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   std::this_thread::sleep_for(std::chrono::milliseconds(50));
   EXPECT_EQ(numbers_of(heard), range(1, said));
+}
+
+// At 30,000 a second, what comes in between would take 0.03 s.
+TEST(Reading, AStopIsHeardThoughAnotherFloodsItsTopic) {
+  constexpr int stops = 10, others = 1000;
+  Ros2Transport to("to");
+  std::atomic<int> last = 0;
+  const auto subscription = to.subscribe_strings(topic, [&](StringMessage&& message) {
+    if (const int number = number_of(message); number > 0) last = number;
+  });
+  const auto from = node_elsewhere(), other = node_elsewhere();
+  const auto& type = Wire<StringMessage>::descriptor();
+  const dds_entity_t writer = from->create_writer(topic, type, Delivery::reliable);
+  for (const Delivery offered : {Delivery::reliable, Delivery::best_effort}) {
+    const dds_entity_t flood = other->create_writer(topic, type, offered);
+    for (const dds_entity_t one : {writer, flood})
+      ASSERT_TRUE(testing::wait_for([&] { return dds_get_matched_subscriptions(one, nullptr, 0) > 0; }));
+    for (int stop = 1; stop <= stops; ++stop) {
+      Wire<StringMessage>::write(writer, text(stop));
+      for (int k = 0; k < others; ++k) Wire<StringMessage>::write(flood, text(0));
+      for (int k = 0; k < 100 && last < stop; ++k) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+      EXPECT_EQ(last, stop);
+    }
+    last = 0;
+    other->remove(flood);
+  }
 }
 
 }  // namespace reading_test

@@ -40,6 +40,8 @@ std::vector<const dds_topic_descriptor_t*> types_of(CommandType command) {
   return {};
 }
 
+constexpr int few = 10;
+
 template <typename Message>
 std::vector<Delivery> deliveries_of() {
   if constexpr (std::is_same_v<Message, OperatingStateMessage>)
@@ -49,11 +51,12 @@ std::vector<Delivery> deliveries_of() {
   return {Delivery::best_effort};
 }
 
-// Messages of a topic that are kept until they are taken, of all its publishers.
-constexpr int few = 5, many = 100;
+// Messages of a topic that are kept until they are taken, of all its publishers: whoever floods it must not push
+// another one's out. 30,000 texts a second take longer than 0.1 s to do so.
 template <typename Message>
 constexpr int depth_of() {
-  return std::is_same_v<Message, OperatingStateMessage> ? many : few;
+  if (std::is_same_v<Message, StringMessage>) return 5000;
+  return std::is_same_v<Message, OperatingStateMessage> ? 1000 : few;
 }
 
 }  // namespace
