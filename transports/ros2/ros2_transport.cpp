@@ -93,8 +93,8 @@ class Ros2Transport::Implementation {
     const auto taken = [handler](const void*, dds_instance_handle_t) { handler(CommandMessage()); };
     auto readings = std::make_shared<std::vector<std::unique_ptr<Reading>>>();
     for (const dds_topic_descriptor_t* descriptor : types_of(type))
-      readings->push_back(
-          std::make_unique<Reading>(node_, topic, *descriptor, std::vector{Delivery::best_effort}, few, taken));
+      readings->push_back(std::make_unique<Reading>(
+          node_, topic, *descriptor, std::vector{Delivery::reliable, Delivery::best_effort}, few, taken));
     return readings;
   }
 

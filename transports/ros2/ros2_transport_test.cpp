@@ -100,6 +100,28 @@ TEST(Ros2Transport, HearsCommandsOfEachTypeThatDvrkReads) {
   }
 }
 
+// A reliable publisher repeats what the network loses; one of best effort is heard as well.
+TEST(Ros2Transport, ACommandThatIsSaidOnceIsHeardOnce) {
+  Ros2Transport loop("loop");
+  const auto client = node_elsewhere();
+  for (const Delivery offered : {Delivery::reliable, Delivery::best_effort, Delivery::latched}) {
+    TestInbox<CommandMessage> heard;
+    const auto subscription = loop.subscribe_commands("/PSM1/move_jp", CommandType::joints, heard.handler());
+    const dds_entity_t writer = client->create_writer("/PSM1/move_jp", Wire<JointMessage>::descriptor(), offered);
+    const int readers = offered == Delivery::best_effort ? 1 : 2;
+    testing::wait_for([&] { return dds_get_matched_subscriptions(writer, nullptr, 0) >= readers; });
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));  // until they know it, too
+    const bool loses = offered == Delivery::reliable;
+    dds_domain_set_deafmute(client->participant(), false, loses, DDS_INFINITY);
+    Wire<JointMessage>::write(writer, {stamp_s, {}, {1}});
+    dds_domain_set_deafmute(client->participant(), false, false, DDS_INFINITY);
+    for (int k = 0; k < 200 && heard.empty(); ++k) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    EXPECT_EQ(heard.count(), 1u) << static_cast<int>(offered);
+    client->remove(writer);
+  }
+}
+
 TEST(Ros2Transport, DoesNotHearItself) {
   Ros2Transport one("one"), other("other");
   TestInbox<JointMessage> own, others;
