@@ -15,16 +15,29 @@ namespace {
 
 constexpr int setpoint_priority = 20;
 
-// CRTK's topics that move an arm, in its namespace, by what they carry.
+// Topics of CRTK and dVRK that move an arm or change its efforts, in its namespace, by what they carry.
 const std::map<std::string, CommandType>& motion_commands() {
   using enum CommandType;
-  static const std::map<std::string, CommandType> commands{
-      {"servo_jp", joints},      {"servo_jr", joints},         {"servo_jv", joints},
-      {"servo_jf", joints},      {"move_jp", joints},          {"move_jr", joints},
-      {"servo_cp", pose},        {"servo_cr", pose},           {"move_cp", pose},
-      {"move_cr", pose},         {"servo_cv", twist},          {"servo_cf", wrench},
-      {"body/servo_cf", wrench}, {"spatial/servo_cf", wrench}, {"hold", nothing},
-      {"free", nothing}};
+  static const std::map<std::string, CommandType> commands{{"servo_jp", joints},
+                                                           {"servo_jr", joints},
+                                                           {"servo_jv", joints},
+                                                           {"servo_jf", joints},
+                                                           {"pid_feed_forward/servo_jf", joints},
+                                                           {"move_jp", joints},
+                                                           {"move_jr", joints},
+                                                           {"servo_cp", pose},
+                                                           {"servo_cr", pose},
+                                                           {"move_cp", pose},
+                                                           {"move_cr", pose},
+                                                           {"servo_cv", twist},
+                                                           {"servo_cf", wrench},
+                                                           {"body/servo_cf", wrench},
+                                                           {"spatial/servo_cf", wrench},
+                                                           {"servo_cs", cartesian_state},
+                                                           {"servo_ci", impedance},
+                                                           {"use_gravity_compensation", on_or_off},
+                                                           {"hold", nothing},
+                                                           {"free", nothing}};
   return commands;
 }
 

@@ -67,9 +67,26 @@ TEST(CrtkRobot, SendsSetPointsOfAllJointsInItsOwnThreadUntilSomethingIsAmiss) {
 }
 
 TEST(CrtkRobot, ACommandOfAnotherByAnyTopicOfMotionHolds) {
-  for (const char* topic :
-       {"servo_jp", "servo_jr", "servo_jv", "servo_jf", "move_jp", "move_jr", "servo_cp", "servo_cr", "move_cp",
-        "move_cr", "servo_cv", "servo_cf", "body/servo_cf", "spatial/servo_cf", "hold", "free"}) {
+  for (const char* topic : {"servo_jp",
+                            "servo_jr",
+                            "servo_jv",
+                            "servo_jf",
+                            "pid_feed_forward/servo_jf",
+                            "move_jp",
+                            "move_jr",
+                            "servo_cp",
+                            "servo_cr",
+                            "move_cp",
+                            "move_cr",
+                            "servo_cv",
+                            "servo_cf",
+                            "body/servo_cf",
+                            "spatial/servo_cf",
+                            "servo_cs",
+                            "servo_ci",
+                            "use_gravity_compensation",
+                            "hold",
+                            "free"}) {
     TestTransport transport;
     StandingClock clock;
     CrtkRobot robot(transport, "PSM1", config_of(true), clock);

@@ -34,6 +34,12 @@ std::vector<const dds_topic_descriptor_t*> types_of(CommandType command) {
       return {&geometry_msgs_msg_dds__TwistStamped__desc};
     case CommandType::wrench:
       return {&geometry_msgs_msg_dds__WrenchStamped__desc};
+    case CommandType::cartesian_state:
+      return {&crtk_msgs_msg_dds__CartesianState__desc};
+    case CommandType::impedance:
+      return {&crtk_msgs_msg_dds__CartesianImpedance__desc};
+    case CommandType::on_or_off:
+      return {&std_msgs_msg_dds__Bool__desc};
     case CommandType::nothing:
       return {&std_msgs_msg_dds__Empty__desc};
   }

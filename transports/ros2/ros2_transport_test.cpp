@@ -87,6 +87,9 @@ TEST(Ros2Transport, HearsCommandsOfEachTypeThatDvrkReads) {
       {CommandType::pose, &geometry_msgs_msg_dds__TransformStamped__desc},
       {CommandType::twist, &geometry_msgs_msg_dds__TwistStamped__desc},
       {CommandType::wrench, &geometry_msgs_msg_dds__WrenchStamped__desc},
+      {CommandType::cartesian_state, &crtk_msgs_msg_dds__CartesianState__desc},
+      {CommandType::impedance, &crtk_msgs_msg_dds__CartesianImpedance__desc},
+      {CommandType::on_or_off, &std_msgs_msg_dds__Bool__desc},
       {CommandType::nothing, &std_msgs_msg_dds__Empty__desc}};
   Ros2Transport loop("loop");
   const auto client = node_elsewhere();
