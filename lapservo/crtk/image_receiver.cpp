@@ -9,6 +9,11 @@
 #include "lapservo/crtk/image_decoder.h"
 
 namespace lapservo::internal {
+namespace {
+
+constexpr double silence_s = 0.5;  // after which a sender is gone
+
+}  // namespace
 
 std::string ImageCounts::text() const {
   std::string text;
@@ -23,19 +28,50 @@ std::string ImageCounts::text() const {
   add("without a stamp", unstamped);
   add("of another size", resized);
   add("unreadable", unreadable);
+  add("of another sender", other_senders);
   return text;
 }
 
 void ImageReceiver::receive(ImageMessage&& message, double arrival_s) {
-  accept(message.stamp_s, arrival_s, std::move(message));
+  take(message, arrival_s);
 }
 
 void ImageReceiver::receive(CompressedImageMessage&& message, double arrival_s) {
-  accept(message.stamp_s, arrival_s, std::move(message));
+  take(message, arrival_s);
 }
 
-void ImageReceiver::accept(double stamp_s, double arrival_s, Message&& message) {
+template <typename Image>
+void ImageReceiver::take(Image& message, double arrival_s) {
   const std::lock_guard lock(mutex_);
+  if (is_of_first_sender(message.source, arrival_s)) {
+    const double stamp_s = message.stamp_s;
+    accept(stamp_s, arrival_s, std::move(message));
+  } else {
+    refuse(&ImageCounts::other_senders, "two programs publish this camera's images");
+  }
+}
+
+bool ImageReceiver::is_of_first_sender(std::uint64_t source, double arrival_s) {
+  if (sender_ && sender_->source != source && arrival_s - sender_->last_s <= silence_s) {
+    if (!other_s_ || arrival_s - *other_s_ > silence_s) second_sender_ = true;
+    other_s_ = arrival_s;
+    return false;
+  }
+  if (!sender_ || sender_->source != source) {
+    last_stamp_s_.reset();
+    other_s_.reset();
+  }
+  sender_ = Heard{source, arrival_s};
+  return true;
+}
+
+bool ImageReceiver::take_second_sender() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(second_sender_, false);
+}
+
+// With the mutex held.
+void ImageReceiver::accept(double stamp_s, double arrival_s, Message&& message) {
   const StampClock::Reading measured = clock_.read(stamp_s, arrival_s);
   switch (measured.verdict) {
     case StampVerdict::fresh:

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -17,8 +18,9 @@ struct ImageCounts {
   long skipped = 0;  ///< replaced by a newer one before it was taken
   long missing = 0;  ///< gaps of more than one and a half times the usual distance of stamps, in frames
   long repeated = 0, late = 0, jumped = 0, unstamped = 0;
-  long resized = 0;     ///< of another size than the rig's camera
-  long unreadable = 0;  ///< wrong encoding, wrong number of bytes, damaged
+  long resized = 0;        ///< of another size than the rig's camera
+  long unreadable = 0;     ///< wrong encoding, wrong number of bytes, damaged
+  long other_senders = 0;  ///< of another program than the one that counts
   /// "skipped 2, late 1"; empty when all were taken.
   std::string text() const;
 };
@@ -28,8 +30,8 @@ enum class StampsBy { sender, loop };
 
 /// A camera's image messages as an ImageStream: the newest, once, decoded by the caller. Only images with a stamp that
 /// is newer than the last count, so a camera that repeats itself soon gives stale images; time_s is that of the fastest
-/// image (StampClock), or the stamp where it is by the loop's clock. Unusable images are dropped, counted, and the
-/// reason is kept.
+/// image (StampClock), or the stamp where it is by the loop's clock. Images count from one sender, the first, until it
+/// has been silent for 0.5 s. Unusable images and those of others are dropped, counted, and the reason is kept.
 class ImageReceiver : public ImageStream {
  public:
   /// `camera`: the rig's.
@@ -45,6 +47,8 @@ class ImageReceiver : public ImageStream {
   ImageCounts counts() const;
   /// Why images were dropped last, in words; empty while none were.
   std::string complaint() const;
+  /// True once when another sender appears beside the one that counts, and again after its absence of 0.5 s.
+  bool take_second_sender();
 
  private:
   using Message = std::variant<ImageMessage, CompressedImageMessage>;
@@ -53,6 +57,9 @@ class ImageReceiver : public ImageStream {
     Message message;
   };
 
+  template <typename Image>
+  void take(Image& message, double arrival_s);
+  bool is_of_first_sender(std::uint64_t source, double arrival_s);
   void accept(double stamp_s, double arrival_s, Message&& message);
   void count_gap(double stamp_s);
   void refuse(long ImageCounts::*count, const std::string& why);
@@ -65,6 +72,13 @@ class ImageReceiver : public ImageStream {
   std::string complaint_;
   std::optional<Waiting> waiting_;
   std::optional<double> last_stamp_s_, distance_s_;
+  struct Heard {
+    std::uint64_t source = 0;
+    double last_s = 0;
+  };
+  std::optional<Heard> sender_;    // whose images count
+  std::optional<double> other_s_;  // when another one's came last
+  bool second_sender_ = false;
 };
 
 }  // namespace lapservo::internal

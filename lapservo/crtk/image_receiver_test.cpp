@@ -77,6 +77,53 @@ TEST(ImageReceiver, DropsAndCountsWhatCanNotBeUsed) {
   EXPECT_EQ(counts.jumped, 1);
 }
 
+// Two take turns, at 30 Hz each.
+TEST(ImageReceiver, TheFirstSenderCountsUntilItIsSilent) {
+  ImageReceiver receiver(4, 2);
+  double now_s = 5;
+  const auto offer = [&](std::uint64_t source, double after_s = period_s / 2) {
+    now_s += after_s;
+    ImageMessage message = image(epoch_s + now_s);
+    message.source = source;
+    receiver.receive(std::move(message), now_s);
+    return receiver.newest().has_value();
+  };
+  EXPECT_TRUE(offer(7));
+  EXPECT_FALSE(receiver.take_second_sender());
+  for (int k = 0; k < 60; ++k) {
+    EXPECT_FALSE(offer(8));
+    EXPECT_EQ(receiver.take_second_sender(), k == 0);
+    EXPECT_TRUE(offer(7));
+  }
+  EXPECT_EQ(receiver.counts().text(), "of another sender 60");
+  EXPECT_EQ(receiver.complaint(), "two programs publish this camera's images");
+  for (int k = 0; k < 60; ++k) EXPECT_TRUE(offer(7, period_s));
+  EXPECT_FALSE(receiver.take_second_sender());
+  EXPECT_FALSE(offer(8));
+  EXPECT_TRUE(receiver.take_second_sender()) << "it was gone, and is back";
+  EXPECT_FALSE(offer(8, 0.4));
+  EXPECT_TRUE(offer(8, 0.11)) << "the first has been silent";
+  EXPECT_FALSE(receiver.take_second_sender());
+  EXPECT_FALSE(offer(7));
+  EXPECT_TRUE(receiver.take_second_sender());
+  EXPECT_TRUE(offer(8));
+  EXPECT_EQ(receiver.counts().missing, 0);
+}
+
+// A sender of useless images is there all the same.
+TEST(ImageReceiver, WhoSendsCompressedImagesIsASenderAsWell) {
+  ImageReceiver receiver(4, 2);
+  CompressedImageMessage compressed;
+  compressed.source = 8;
+  receiver.receive(std::move(compressed), 5);
+  ImageMessage other = image(epoch_s);
+  other.source = 7;
+  receiver.receive(std::move(other), 5.1);
+  EXPECT_FALSE(receiver.newest());
+  EXPECT_EQ(receiver.counts().text(), "without a stamp 1, of another sender 1");
+  EXPECT_TRUE(receiver.take_second_sender());
+}
+
 TEST(ImageReceiver, CountsLateAndMissingFrames) {
   ImageReceiver receiver(4, 2);
   for (int k = 0; k < 30; ++k)

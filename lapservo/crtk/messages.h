@@ -75,6 +75,7 @@ struct ImageMessage {
   std::string encoding;
   bool is_bigendian = false;
   std::vector<std::uint8_t> data;
+  std::uint64_t source = 0;  ///< as in JointMessage
 };
 
 /// sensor_msgs/CompressedImage.
@@ -82,6 +83,7 @@ struct CompressedImageMessage {
   double stamp_s = 0;
   std::string format;
   std::vector<std::uint8_t> data;
+  std::uint64_t source = 0;  ///< as in JointMessage
 };
 
 /// sensor_msgs/CameraInfo of a camera with plumb_bob distortion, not rectified.

@@ -50,15 +50,19 @@ const TrajectoryMessage sample_trajectory{sample_stamp_s, {"s_rad"}, {{0, {1}}, 
 const ImageMessage sample_image{sample_stamp_s, 2, 1, 6, "bgr8", true, {1, 2, 3, 4, 5, 6}};
 const CompressedImageMessage sample_jpeg{sample_stamp_s, "jpeg", {7, 8}};
 
-/// Messages that `from` sends on the topic `in` + KIND arrive at `to` on `out` + KIND, for each kind but the operating
-/// state.
+/// Messages that `from` sends on the topic `in` + KIND arrive at `to` on `out` + KIND, with their sender, for each kind
+/// but the operating state.
 inline void expect_carries_each_kind(Transport& from, const std::string& in, Transport& to, const std::string& out) {
   const auto carry_as = [&]<typename Message>(const std::string& kind, auto publisher, auto subscribe, const auto& sent,
                                               const Message& heard) {
     TestInbox<Message> inbox;
     const auto subscription = (to.*subscribe)(out + kind, inbox.handler());
     const auto say = (from.*publisher)(in + kind);
-    expect_same(inbox.get([&] { say(sent); }), heard);
+    const Message one = inbox.get([&] { say(sent); });
+    expect_same(one, heard);
+    if constexpr (requires { one.source; }) {
+      EXPECT_NE(one.source, 0u) << "nobody sent " << kind;
+    }
   };
   const auto carry = [&](const std::string& kind, auto publisher, auto subscribe, const auto& sent) {
     carry_as(kind, publisher, subscribe, sent, sent);
