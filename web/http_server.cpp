@@ -66,6 +66,12 @@ MHD_Result add_cookie(void* request, MHD_ValueKind, const char* key, const char*
   return MHD_YES;
 }
 
+std::string bytes_of(const sockaddr& address) {
+  const auto text = [](const auto& from) { return std::string(reinterpret_cast<const char*>(&from), sizeof from); };
+  return address.sa_family == AF_INET6 ? text(reinterpret_cast<const sockaddr_in6&>(address).sin6_addr)
+                                       : text(reinterpret_cast<const sockaddr_in&>(address).sin_addr);
+}
+
 bool has_body(const HttpRequest& request) {
   const auto length = request.header("content-length");
   return request.headers.count("transfer-encoding") > 0 ||
@@ -130,10 +136,10 @@ struct HttpServer::Callbacks {
       (void)lowered;
       const int descriptor = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD)->connect_fd;
       try {
-        auto made = std::make_unique<Peer>(Peer{descriptor, {}});
+        const sockaddr& address = *MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CLIENT_ADDRESS)->client_addr;
+        auto made = std::make_unique<Peer>(Peer{descriptor, bytes_of(address)});
         self.set_deadline(*made, self.limits_.first_s);
-        const std::lock_guard lock(self.mutex_);
-        self.peers_.insert(made.get());
+        self.admit(*made);
         *peer = made.release();
       } catch (const std::exception&) {  // no memory
         ::shutdown(descriptor, SHUT_RDWR);
@@ -141,7 +147,7 @@ struct HttpServer::Callbacks {
     } else {
       const std::unique_ptr<Peer> ended(static_cast<Peer*>(*peer));
       const std::lock_guard lock(self.mutex_);
-      self.peers_.erase(ended.get());
+      std::erase(self.peers_, ended.get());
     }
   }
 
@@ -158,6 +164,7 @@ struct HttpServer::Callbacks {
     MHD_get_connection_values(connection, MHD_HEADER_KIND, add_header, &request);
     MHD_get_connection_values(connection, MHD_GET_ARGUMENT_KIND, add_query, &request);
     MHD_get_connection_values(connection, MHD_COOKIE_KIND, add_cookie, &request);
+    exchange->peer->has_requested = true;
     self.set_deadline(*exchange->peer, self.limits_.answer_s);
     return exchange.release();
   }
@@ -176,8 +183,7 @@ void HttpServer::open(const std::string& address, int port, const std::string& o
   daemon_ =
       MHD_start_daemon(MHD_USE_EPOLL_INTERNAL_THREAD | MHD_ALLOW_SUSPEND_RESUME | v6, static_cast<std::uint16_t>(port),
                        nullptr, nullptr, &Callbacks::on_request, this, MHD_OPTION_SOCK_ADDR, &where.any,  //
-                       MHD_OPTION_CONNECTION_LIMIT, limits_.connections,                                  //
-                       MHD_OPTION_PER_IP_CONNECTION_LIMIT, limits_.connections_per_address,               //
+                       MHD_OPTION_CONNECTION_LIMIT, 2 * limits_.connections,                              //
                        MHD_OPTION_CONNECTION_MEMORY_LIMIT, limits_.request_bytes,                         //
                        MHD_OPTION_CONNECTION_TIMEOUT,
                        static_cast<unsigned>(std::max({limits_.first_s, limits_.head_s, limits_.answer_s})),  //
@@ -234,6 +240,33 @@ void HttpServer::set_deadline(Peer& peer, double from_now_s) {
                   std::chrono::duration_cast<Time::duration>(std::chrono::duration<double>(from_now_s));
 }
 
+// A connection more than the limits allow is ended: the oldest without a request yet or, where there is none, the
+// new one. The server forgets it soon, and until then has room for as many again.
+void HttpServer::admit(Peer& peer) {
+  const std::lock_guard lock(mutex_);
+  peers_.push_back(&peer);
+  const auto is_any = [](const Peer&) { return true; };
+  const auto is_neighbour = [&](const Peer& other) { return other.address == peer.address; };
+  if (!make_room(is_neighbour, limits_.connections_per_address) || !make_room(is_any, limits_.connections)) end(peer);
+}
+
+// With the mutex held; the last peer is the new one.
+bool HttpServer::make_room(const std::function<bool(const Peer&)>& among, unsigned limit) {
+  const auto counts = [&](const Peer* peer) { return !peer->is_ended && among(*peer); };
+  if (std::count_if(peers_.begin(), peers_.end(), counts) <= limit) return true;
+  const auto silent = std::find_if(peers_.begin(), peers_.end() - 1,
+                                   [&](const Peer* peer) { return counts(peer) && !peer->has_requested; });
+  if (silent == peers_.end() - 1) return false;
+  end(**silent);
+  return true;
+}
+
+// With the mutex held. The server sees that it has ended, and forgets it.
+void HttpServer::end(Peer& peer) {
+  peer.is_ended = true;
+  ::shutdown(peer.descriptor, SHUT_RDWR);
+}
+
 // With the mutex held. Allocates nothing: those who call it could not say what failed.
 void HttpServer::resume(const std::function<bool(const Exchange&)>& which) {
   const auto end = std::partition(waiting_.begin(), waiting_.end(), [&](const Exchange* one) { return !which(*one); });
@@ -254,9 +287,8 @@ void HttpServer::watch_time() {
     changed_.wait_for(lock, std::chrono::milliseconds(100));
     const auto now = std::chrono::steady_clock::now();
     resume([now](const Exchange& exchange) { return now >= *exchange.patience; });
-    // The server sees that they have ended, and forgets them.
-    for (const Peer* peer : peers_)
-      if (now >= peer->deadline) ::shutdown(peer->descriptor, SHUT_RDWR);
+    for (Peer* peer : peers_)
+      if (now >= peer->deadline) end(*peer);
   }
 }
 

@@ -6,7 +6,6 @@
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <set>
 #include <string>
 #include <thread>
 #include <vector>
@@ -20,12 +19,12 @@ namespace lapservo::internal {
 
 /// Limits on the cost of other programs' requests.
 struct HttpLimits {
-  unsigned connections = 48, connections_per_address = 24;
-  std::size_t request_bytes = 16384;  ///< request line and headers; a body is refused
-  double first_s = 1;                 ///< for a connection's first request to come: who is silent keeps others out
-  double head_s = 5;                  ///< for the next one's head, from the answer before on
-  double answer_s = 20;               ///< for an answer to be fetched
-  double patience_s = 1;              ///< a waiting request is answered at the latest after this time
+  unsigned connections = 48, connections_per_address = 24;  ///< who has requested nothing yet makes room
+  std::size_t request_bytes = 16384;                        ///< request line and headers; a body is refused
+  double first_s = 1;                                       ///< for a connection's first request to come
+  double head_s = 5;                                        ///< for the next one's head, from the answer before on
+  double answer_s = 20;                                     ///< for an answer to be fetched
+  double patience_s = 1;  ///< a waiting request is answered at the latest after this time
 };
 
 /// HTTP/1.1 by libmicrohttpd, in one thread at low priority, and another that watches the time.
@@ -48,7 +47,10 @@ class HttpServer {
   using Time = std::chrono::steady_clock::time_point;
   struct Peer {
     int descriptor = -1;
-    Time deadline;
+    std::string address;  ///< as bytes
+    Time deadline{};
+    bool is_ended = false;
+    bool has_requested = false;  ///< known to the server's thread only
   };
   struct Exchange;
   struct Callbacks;
@@ -56,6 +58,9 @@ class HttpServer {
   void open(const std::string& address, int port, const std::string& option);
   int answer(MHD_Connection* connection, Exchange& exchange);
   void set_deadline(Peer& peer, double from_now_s);
+  void admit(Peer& peer);
+  static void end(Peer& peer);
+  bool make_room(const std::function<bool(const Peer&)>& among, unsigned limit);
   void resume(const std::function<bool(const Exchange&)>& which);
   void watch_time();
 
@@ -63,7 +68,7 @@ class HttpServer {
   Handler handler_;
   std::mutex mutex_;
   std::condition_variable changed_;
-  std::set<Peer*> peers_;
+  std::vector<Peer*> peers_;        // in the order in which they came
   std::vector<Exchange*> waiting_;  // their connections are suspended
   long wakes_ = 0;
   bool ended_ = false;

@@ -256,7 +256,56 @@ TEST(LivePage, ForgetsWhoDoesNotFinishAsking) {
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(2));
 }
 
-// Silent connections would keep the buttons out.
+using Crowd = std::vector<std::unique_ptr<RawConnection>>;
+
+Crowd crowd_of(const Served& page, std::size_t count, const std::string& saying = "") {
+  Crowd crowd;
+  for (std::size_t i = 0; i < count; ++i) {
+    crowd.push_back(std::make_unique<RawConnection>(page.port));
+    crowd.back()->say(saying);
+  }
+  return crowd;
+}
+
+// By the limits as they are.
+TEST(LivePage, WhoSaysNothingKeepsNobodyFromTheButtons) {
+  PageConfig config = config_of_test();
+  config.limits = HttpLimits();
+  for (const std::string& saying : {std::string(), std::string("GET / HTTP/1.1\r\nHost:")})
+    for (const std::size_t count : {24u, 200u}) {
+      Served page(config);
+      const Crowd crowd = crowd_of(page, count, saying);
+      const auto begin = std::chrono::steady_clock::now();
+      EXPECT_EQ(page.get("/"), 200) << count;
+      const auto shown = std::chrono::steady_clock::now();
+      EXPECT_EQ(page.post("/hold"), 202) << count;
+      EXPECT_EQ(page.take_wishes().hold, true);
+      EXPECT_LT(shown - begin, std::chrono::milliseconds(200));
+      EXPECT_LT(std::chrono::steady_clock::now() - shown, std::chrono::milliseconds(200));
+    }
+}
+
+// Those that have requested something stay, up to the limit.
+TEST(LivePage, NewConnectionsEndNoneThatHasRequested) {
+  PageConfig config = config_of_test();
+  config.limits.connections_per_address = 4;
+  config.limits.head_s = 60;
+  Served page(config);
+  const std::string question = fmt::format("GET /state HTTP/1.1\r\nHost: 127.0.0.1:{}\r\n", page.port);
+  Crowd asking;
+  for (int i = 0; i < 4; ++i) {
+    asking.push_back(std::move(crowd_of(page, 1, question + "\r\n").front()));
+    EXPECT_EQ(http_status(asking.back()->hear_some()), 200);
+  }
+  const Crowd others = crowd_of(page, 20);
+  EXPECT_EQ(others.front()->hear(), "");
+  EXPECT_EQ(page.get("/state"), 0) << "more than the limit";
+  for (const auto& one : asking) {
+    one->say(question + "Connection: close\r\n\r\n");
+    EXPECT_EQ(http_status(one->hear_some()), 200);
+  }
+}
+
 TEST(LivePage, WaitsLongerForTheNextRequestThanForTheFirst) {
   EXPECT_LE(HttpLimits{}.first_s, 1);
   PageConfig config = config_of_test();

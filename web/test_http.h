@@ -30,6 +30,12 @@ class RawConnection {
   bool say(const std::string& text) const {
     return ::send(socket_.number(), text.data(), text.size(), MSG_NOSIGNAL) == static_cast<ssize_t>(text.size());
   }
+  /// The beginning of what comes.
+  std::string hear_some() const {
+    char part[4096];
+    const ssize_t n = ::recv(socket_.number(), part, sizeof part, 0);
+    return {part, static_cast<std::size_t>(n > 0 ? n : 0)};
+  }
   /// All that comes until the server ends the connection.
   std::string hear() const {
     std::string text;
