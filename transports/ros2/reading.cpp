@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
-#include <optional>
 #include <utility>
 
 namespace lapservo::internal {
@@ -43,7 +42,7 @@ bool has_volatile_publisher(dds_entity_t reader) {
 }  // namespace
 
 Reading::Reading(std::shared_ptr<DdsNode> node, const std::string& topic, const dds_topic_descriptor_t& type,
-                 const std::vector<Delivery>& deliveries, int depth, Taken taken)
+                 const std::vector<Delivery>& deliveries, std::optional<int> depth, Taken taken)
     : node_(std::move(node)),
       topic_(topic),
       deliveries_(deliveries),

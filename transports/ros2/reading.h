@@ -5,6 +5,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -18,10 +19,9 @@ namespace lapservo::internal {
 class Reading {
  public:
   using Taken = std::function<void(const void*, dds_instance_handle_t writer)>;
-  /// A reader for each delivery, the most demanding first. `depth`: messages that each keeps, of all writers, until
-  /// they are taken.
+  /// A reader for each delivery, the most demanding first. `depth`: as in DdsNode::create_reader(), for each.
   Reading(std::shared_ptr<DdsNode> node, const std::string& topic, const dds_topic_descriptor_t& type,
-          const std::vector<Delivery>& deliveries, int depth, Taken taken);
+          const std::vector<Delivery>& deliveries, std::optional<int> depth, Taken taken);
   ~Reading();
   Reading(const Reading&) = delete;
   Reading& operator=(const Reading&) = delete;

@@ -3,6 +3,7 @@
 #include <cstdlib>
 #include <functional>
 #include <map>
+#include <optional>
 #include <set>
 #include <type_traits>
 #include <utility>
@@ -46,8 +47,6 @@ std::vector<const dds_topic_descriptor_t*> types_of(CommandType command) {
   return {};
 }
 
-constexpr int few = 10;
-
 template <typename Message>
 std::vector<Delivery> deliveries_of() {
   if constexpr (std::is_same_v<Message, OperatingStateMessage>)
@@ -60,9 +59,10 @@ std::vector<Delivery> deliveries_of() {
 // Messages of a topic that are kept until they are taken, of all its publishers: whoever floods it must not push
 // another one's out. 30,000 texts a second take longer than 0.1 s to do so.
 template <typename Message>
-constexpr int depth_of() {
+std::optional<int> depth_of() {
   if (std::is_same_v<Message, StringMessage>) return 5000;
-  return std::is_same_v<Message, OperatingStateMessage> ? 1000 : few;
+  if (std::is_same_v<Message, OperatingStateMessage>) return 1000;
+  return std::nullopt;
 }
 
 }  // namespace
@@ -100,7 +100,7 @@ class Ros2Transport::Implementation {
     auto readings = std::make_shared<std::vector<std::unique_ptr<Reading>>>();
     for (const dds_topic_descriptor_t* descriptor : types_of(type))
       readings->push_back(std::make_unique<Reading>(
-          node_, topic, *descriptor, std::vector{Delivery::reliable, Delivery::best_effort}, few, taken));
+          node_, topic, *descriptor, std::vector{Delivery::reliable, Delivery::best_effort}, std::nullopt, taken));
     return readings;
   }
 
