@@ -677,6 +677,40 @@ TEST_P(FirstWireLoop, StopsAndStartsAndTakesSetPointsAndTrajectoriesByTopic) {
   spy_->expect_no_jump();
 }
 
+// As of an arm's program that does something else for a moment, or of a busy network.
+TEST_P(WireLoop, PausesOfTheArmPassByThemselves) {
+  begin();
+  ASSERT_TRUE(moves(500));
+  for (int k = 0; k < 10; ++k) {
+    room_->silent = true;
+    sleep(0.05 + 0.035 * k);
+    room_->silent = false;
+    sleep(1.2);
+  }
+  EXPECT_EQ(said().find("foreign_command"), std::string::npos) << said();
+  EXPECT_EQ(said().find("say start"), std::string::npos) << said();
+  EXPECT_EQ(said().find("then start"), std::string::npos) << said();
+  EXPECT_TRUE(moves(100));
+  spy_->expect_no_jump();
+  end();
+}
+
+TEST_P(WireLoop, ALoopThatHungNeedsAStart) {
+  begin();
+  ASSERT_TRUE(moves(500));
+  for (const double hung_s : {0.7, 3.0}) {
+    loop_->signal(SIGSTOP);
+    sleep(hung_s);
+    const std::size_t before = spy_->count(), said_before = said().size();
+    loop_->signal(SIGCONT);
+    expect_soon_said("loop_late", said_before);
+    sleep(1);
+    EXPECT_EQ(spy_->count(), before);
+    ASSERT_TRUE(moves(300, [&] { start(); }));
+  }
+  end();
+}
+
 TEST_P(WireLoop, SurvivesWhenEitherSideIsKilledOrStopped) {
   listen();
   auto room = arm();

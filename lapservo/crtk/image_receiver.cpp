@@ -58,6 +58,7 @@ bool ImageReceiver::is_of_first_sender(std::uint64_t source, double arrival_s) {
     return false;
   }
   if (!sender_ || sender_->source != source) {
+    second_sender_ = second_sender_ || sender_;
     last_stamp_s_.reset();
     other_s_.reset();
   }

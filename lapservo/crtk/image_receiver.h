@@ -47,7 +47,8 @@ class ImageReceiver : public ImageStream {
   ImageCounts counts() const;
   /// Why images were dropped last, in words; empty while none were.
   std::string complaint() const;
-  /// True once when another sender appears beside the one that counts, and again after its absence of 0.5 s.
+  /// True once when another sender appears beside the one that counts, or after it; and again after its absence of
+  /// 0.5 s.
   bool take_second_sender();
 
  private:

@@ -103,7 +103,7 @@ TEST(ImageReceiver, TheFirstSenderCountsUntilItIsSilent) {
   EXPECT_TRUE(receiver.take_second_sender()) << "it was gone, and is back";
   EXPECT_FALSE(offer(8, 0.4));
   EXPECT_TRUE(offer(8, 0.11)) << "the first has been silent";
-  EXPECT_FALSE(receiver.take_second_sender());
+  EXPECT_TRUE(receiver.take_second_sender()) << "it took over";
   EXPECT_FALSE(offer(7));
   EXPECT_TRUE(receiver.take_second_sender());
   EXPECT_TRUE(offer(8));

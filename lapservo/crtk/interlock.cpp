@@ -173,7 +173,9 @@ void Interlock::watch_rest(double now_s) {
     return one && now_s - one->arrival_s < config_.max_age_s;
   };
   if (!is_new(measured_) || !is_new(setpoint_)) return rest_.reset();
-  if (phase_ != Phase::idle || (!sent_.empty() && now_s - sent_.back().time_s < settling_s)) return rest_.reset();
+  // Where we sent it last, it still goes, however late it hears of that.
+  const double since_s = sent_.empty() ? memory_s : now_s - sent_.back().time_s;
+  if (phase_ != Phase::idle || since_s < (continues_ ? memory_s : settling_s)) return rest_.reset();
   const auto left = [](const Eigen::Vector4d& now, const Eigen::Vector4d& then) {
     return ((now - then).array().abs() > same_q.array()).any();
   };

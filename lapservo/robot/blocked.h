@@ -21,7 +21,7 @@ enum class Blocked {
   second_source,      ///< two programs publish the states of this arm
   restarted,          ///< another program than before publishes its states: nothing that was known holds
   moving,             ///< the arm moves without being sent anywhere
-  second_camera,      ///< two programs publish the images that the loop goes by
+  second_camera,      ///< another program publishes the images that the loop goes by, too or instead
   second_reader,      ///< more programs than the arm's read its setpoints
   no_reader,          ///< nobody reads its setpoints
   displaced,          ///< the arm is not where it was sent: something moved or blocked it

@@ -29,7 +29,7 @@ constexpr internal::Words<Blocked, 16> remedies{
      {Blocked::second_source, "two programs publish the arm's states: end one of them"},
      {Blocked::restarted, "another program than before publishes the arm's states"},
      {Blocked::moving, "it moves by itself, or another program moves it: let it come to rest"},
-     {Blocked::second_camera, "two programs publish the camera's images: end one of them"},
+     {Blocked::second_camera, "another program publishes the camera's images, too or instead: check whose they are"},
      {Blocked::second_reader, "other nodes than the arm's read servo_jp: end them, or allow their number"},
      {Blocked::no_reader, "nobody reads servo_jp: start the arm"},
      {Blocked::operator_absent, "press what says that the operator is present"}}};

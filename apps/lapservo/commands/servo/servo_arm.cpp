@@ -65,7 +65,7 @@ class Goal {
 class ArmWatcher : public RunObserver {
  public:
   ArmWatcher(const ServoOptions& options, const RunConfig& run, Supervisor& arm, const CrtkRobot& robot,
-             const LiveImages& images, LoopTopics& topics, Goal& goal, RunFolder* folder, ServoPage* page)
+             LiveImages& images, LoopTopics& topics, Goal& goal, RunFolder* folder, ServoPage* page)
       : options_(options),
         run_(run),
         arm_(arm),
@@ -91,6 +91,7 @@ class ArmWatcher : public RunObserver {
     obey(topics_.wishes(), tick, time_s);
     if (!options_.enable_motion) say_what_would_be_sent(time_s);
     if (page_ && obey_page(tick, time_s)) return false;
+    if (images_.take_second_sender()) arm_.report(Blocked::second_camera);
     if (topics_.name_is_in_use()) {
       say(time_s, "end: " + name_in_use(run_.rig));
       return false;
@@ -175,7 +176,7 @@ class ArmWatcher : public RunObserver {
   const RunConfig& run_;
   Supervisor& arm_;
   const CrtkRobot& robot_;
-  const LiveImages& images_;
+  LiveImages& images_;
   LoopTopics& topics_;
   Goal& goal_;
   RunFolder* folder_;
