@@ -231,7 +231,7 @@ std::string Explanation::text(const Instrument& instrument) const {
     case Cause::offset:
       return fmt::format("joints.offset of {} is wrong: {}", name, remedy);
     case Cause::registration:
-      return fmt::format("camera_from_rcm is wrong: {}", remedy);
+      return fmt::format("camera_from_rcm is wrong, or the camera shows another arm: {}", remedy);
     case Cause::rig:
       return fmt::format(
           "joints.sign, joints.offset or camera_from_rcm is wrong, the motion so far does not show which: {}", remedy);

@@ -89,14 +89,15 @@ void EndoscopeRecovery::collect(const ImageMeasurement& image, VisualController&
   add(seen_, JointsAndMarker{image.time_s, measured_->q, measured_->rate, camera_from_marker}, max_compared);
   // The operator's motion may show which number it is.
   if (const auto why = wrong_rig(); why && why->cause == Explanation::Cause::rig && seen_.size() >= explain_at_)
-    blames_rig(controller, true);
+    blames_rig(controller, Blame::named);
 }
 
-// Whether the rig was wrong from the start, by a number that is `named`.
-bool EndoscopeRecovery::blames_rig(VisualController& controller, bool named) {
+// Whether the rig was wrong from the start.
+bool EndoscopeRecovery::blames_rig(VisualController& controller, Blame wanted) {
   const Explanation why = explain_disagreement(seen_, instrument());
   explain_at_ = std::min(max_compared, explained_again_after * seen_.size());
-  if (!why.is_of_the_rig() || (named && why.cause == Explanation::Cause::rig)) return false;
+  if (!why.is_of_the_rig() || (wanted != Blame::any && why.cause == Explanation::Cause::rig)) return false;
+  if (wanted == Blame::sign && why.cause != Explanation::Cause::sign) return false;
   state_ = WrongRig{why};
   controller.suspend(HoldReason::wrong_rig);
   return true;
@@ -115,7 +116,7 @@ void EndoscopeRecovery::watch(Watching& watching, const ImageMeasurement& image,
   if (!contradicts && !(moves && image.marker)) return drop_suspicion(controller);
   if (agreeing_ < agreed_after) return;
   if (watching.contradicting >= moved_after)
-    return blames_rig(controller, false) ? void() : notice(watching, controller);
+    return blames_rig(controller, Blame::any) ? void() : notice(watching, controller);
   watching.suspects = true;
   controller.suspend(HoldReason::endoscope_moved);
 }
@@ -140,8 +141,10 @@ bool EndoscopeRecovery::stepped(const ImageMeasurement& image, bool delay_is_kno
 
 void EndoscopeRecovery::doubt(HoldReason reason, VisualController& controller) {
   const bool watches = std::holds_alternative<Watching>(state_);
-  const bool contradicted = reason == HoldReason::psi_contradicted || reason == HoldReason::image_not_following;
-  if (contradicted && watches && seen_.size() >= explain_at_) blames_rig(controller, true);
+  // Another registration or offset does not make an image stand still.
+  const bool still = reason == HoldReason::image_not_following;
+  if ((still || reason == HoldReason::psi_contradicted) && watches && seen_.size() >= explain_at_)
+    blames_rig(controller, still ? Blame::sign : Blame::named);
   if (reason != HoldReason::wild_joints && reason != HoldReason::frozen_image) return;
   seen_.clear();
   sees_from_start_ = false;
@@ -251,7 +254,7 @@ void EndoscopeRecovery::wait_for_motion(WaitingForMotion& waiting, const MarkerS
     state_ = WaitingForStart{std::move(sightings)};
     return controller.suspend(HoldReason::endoscope_measured);
   }
-  if ((!found || contradicts) && blames_rig(controller, false)) return;
+  if ((!found || contradicts) && blames_rig(controller, Blame::any)) return;
   // The endoscope moved once more: the newer ones may all be of where it is now.
   if (contradicts) sightings.erase(sightings.begin(), sightings.begin() + static_cast<long>(sightings.size() / 2));
   waiting.fit_at = std::clamp(sightings.size() * 3 / 2, min_images, max_images);

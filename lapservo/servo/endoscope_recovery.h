@@ -85,7 +85,8 @@ class EndoscopeRecovery {
   using WrongRig = endoscope::WrongRig;
 
   void collect(const ImageMeasurement& image, VisualController& controller);
-  bool blames_rig(VisualController& controller, bool named);
+  enum class Blame { any, named, sign };  ///< whatever of the rig is wrong; one number; one joint's sign
+  bool blames_rig(VisualController& controller, Blame wanted);
   bool jumped(const Watching& watching, const Eigen::Vector4d& q_seen) const;
   bool stepped(const ImageMeasurement& image, bool delay_is_known);
   void watch(Watching& watching, const ImageMeasurement& image, VisualController& controller);

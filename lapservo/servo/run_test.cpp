@@ -769,7 +769,8 @@ TEST(Run, NamesWhatOfTheRigWasWrongFromTheStart) {
   }
   Misread turned;
   turned.turned = rotation_by({0.3, 0.4, -0.3});
-  EXPECT_EQ(wrong_rig_of(turned), "camera_from_rcm" + remedy);
+  EXPECT_EQ(wrong_rig_of(turned),
+            "camera_from_rcm is wrong, or the camera shows another arm: run lapservo calibrate registration");
 }
 
 // Its joints carry the times of another clock, and it may be on its way at first, from where no goal can be reached.
