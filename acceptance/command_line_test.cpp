@@ -431,6 +431,8 @@ TEST_F(CommandLine, ServoRefusesWhatCanNotBe) {
   const std::string servo = "servo --rig configs/paper.yaml --out out/run";
   expect_refused(servo, {"--robot", "sim"});
   expect_refused(servo + " --robot psm9", {"--robot", "psm9", "sim"});
+  expect_refused(servo + " --robot ros2:PSM2 --camera /dev/video0", {"--robot", "PSM2", "PSM1", "--instrument"});
+  expect_refused(servo + " --robot sim --instrument PSM3", {"--instrument", "PSM3", "PSM1"});
   expect_refused(servo + " --robot ros2:PSM1 --camera video.mp4", {"--camera", "is video.mp4", "/dev/videoN"});
   expect_refused(servo + " --robot ros2:PSM1 --camera ''", {"--camera", "is missing", "ros2:/topic"});
   for (const std::string start : {"", " --start 0.05,1.57,0.064,1.2"}) {

@@ -6,6 +6,7 @@
 
 #include "lapservo/control/newton_inverse.h"
 #include "lapservo/control/tracking_law.h"
+#include "lapservo/core/angles.h"
 #include "lapservo/core/error.h"
 
 namespace lapservo {
@@ -57,6 +58,12 @@ bool can_be_shown(const Eigen::Vector4d& features) {
   return features.allFinite() && r_px >= 0 && d_px > 0 && d_px < l_px;
 }
 
+std::string angle_text(double s_rad) {
+  std::array<char, 128> text{};
+  std::snprintf(text.data(), text.size(), "s_rad is %g, expected radians within 2 pi: it looks like degrees", s_rad);
+  return text.data();
+}
+
 }  // namespace
 
 std::string Infeasible::text() const {
@@ -73,6 +80,7 @@ std::optional<Infeasible> find_infeasible(const Trajectory& trajectory, double d
   for (long i = 0; i <= steps; ++i) {
     const double time_s = step_s * static_cast<double>(i);
     const DesiredFeatures desired = trajectory.at(time_s);
+    if (std::abs(desired.features[0]) > two_pi) return Infeasible{time_s, angle_text(desired.features[0])};
     if (!can_be_shown(desired.features)) return Infeasible{time_s, "no image shows these features"};
     if (!model) continue;
     const auto found = newton_inverse(model, desired.features, q, config.scales);

@@ -119,6 +119,12 @@ class TrajectoryCheck : public ::testing::Test {
   Eigen::Vector4d start{0.05, 1.57, 0.064, 1};
 };
 
+TEST_F(TrajectoryCheck, RefusesAnAngleInDegrees) {
+  const auto degrees = find_infeasible(set_point({51, 795, 365, 212}), 1, model, config, start);
+  ASSERT_TRUE(degrees);
+  EXPECT_NE(degrees->what.find("s_rad is 51, expected radians within 2 pi: it looks like degrees"), std::string::npos);
+}
+
 TEST_F(TrajectoryCheck, AcceptsThePapersTrajectory) {
   const auto problem = find_infeasible(sinusoids(paper_sinusoids()), 30, model, config, start);
   EXPECT_FALSE(problem) << problem->what << " at " << problem->time_s;

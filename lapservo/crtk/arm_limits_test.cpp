@@ -30,6 +30,13 @@ TEST(ArmLimits, WrongOnesAreRefusedByName) {
                 .find(": rate: "),
             std::string::npos);
   EXPECT_NE(complaint("lower: [0, 0, 0, 0]\n" + rates).find(": upper: "), std::string::npos);
+  EXPECT_NE(complaint("lower: [-85, -50, 0, -260]\nupper: [85, 50, 0.2, 260]\n" + rates).find("-85 looks like degrees"),
+            std::string::npos);
+  EXPECT_NE(complaint("lower: [-1, -1, 10, -4]\nupper: [1, 1, 240, 4]\n" + rates).find("10 looks like millimetres"),
+            std::string::npos);
+  EXPECT_NE(complaint("lower: [0, 0, 0, 0]\nupper: [1, 1, 1, 1]\nrate: [20, 1, 1, 1]\nacceleration: [1, 1, 1, 1]\n")
+                .find("rate: is a list of 4, expected radians within 10 for number 1: 20 looks like degrees"),
+            std::string::npos);
   EXPECT_NE(complaint("lowr: [0, 0, 0, 0]\n" + rates).find("lowr"), std::string::npos);
 }
 

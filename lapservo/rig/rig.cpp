@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "lapservo/core/joint_units.h"
 #include "lapservo/core/known_keys.h"
 #include "lapservo/core/yaml_field.h"
 #include "lapservo/geometry/invertible.h"
@@ -249,6 +250,8 @@ Joints parse_joints(const YamlField& field) {
   for (const double sign : joints.sign)
     if (std::abs(sign) != 1) signs.fail(std::to_string(sign), "1 or -1");
   joints.offset = field["offset"].numbers<4>("four numbers, rad rad m rad", 100, "an offset within 100 rad or m");
+  constexpr double turn = 6.2832;  // psi's is known but for whole turns
+  expect_radians_and_metres(field["offset"], joints.offset, {{turn, turn, 1, turn}});
   joints.sigma_offset = sigmas_in<4>(field, "sigma_offset");
   return joints;
 }

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "lapservo/core/joint_units.h"
 #include "lapservo/core/known_keys.h"
 #include "lapservo/core/yaml_field.h"
 
@@ -18,13 +19,22 @@ Eigen::Vector4d four(const YamlField& field) {
   return Eigen::Vector4d(values.data());
 }
 
+struct LimitKey {
+  const char* key;
+  Eigen::Vector4d* values;
+  JointUnits units;
+};
+
 JointLimits read_limits(const YamlField& map, JointLimits limits) {
-  for (const auto& [key, value] :
-       std::initializer_list<std::pair<const char*, Eigen::Vector4d*>>{{"lower", &limits.lower},
-                                                                       {"upper", &limits.upper},
-                                                                       {"rate", &limits.rate},
-                                                                       {"acceleration", &limits.acceleration}})
-    if (const YamlField field = map[key]; field.present()) *value = four(field);
+  for (const auto& [key, values, units] :
+       std::initializer_list<LimitKey>{{"lower", &limits.lower, joint_positions},
+                                       {"upper", &limits.upper, joint_positions},
+                                       {"rate", &limits.rate, joint_rates},
+                                       {"acceleration", &limits.acceleration, joint_accelerations}})
+    if (const YamlField field = map[key]; field.present()) {
+      *values = four(field);
+      expect_radians_and_metres(field, field.numbers<4>("a list of four numbers"), units);
+    }
   expect_keys(map, {{"lower", "upper", "rate", "acceleration"}, {}});
   return limits;
 }

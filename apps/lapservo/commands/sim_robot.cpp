@@ -79,6 +79,9 @@ int run(const SimRobotOptions& options) {
       "%s:%s/image_raw ",
       options.arm.c_str(), options.camera.c_str(), options.rig.c_str(), options.transport.c_str(), options.arm.c_str(),
       options.transport.c_str(), options.camera.c_str());
+  const std::string& instrument = rig.instruments.front().name;
+  if (options.arm != instrument && options.arm != "SIM_" + instrument)
+    std::printf("--instrument %s ", instrument.c_str());
   std::printf("--enable-motion moves it, Ctrl-C ends this\n");
   std::fflush(stdout);
   SteadyClock clock;

@@ -191,6 +191,8 @@ void add_arm_options(Command command, ServoOptions& options) {
   command.add_option(
       "--robot", options.robot,
       "sim: the built-in simulator; ros2:PSM1 or ros1:PSM1: the arm of that CRTK namespace, see docs/dvrk.md");
+  command.add_option("--instrument", options.instrument,
+                     "The rig's instrument that is steered; else the one of the arm's name, PSM1 for ros2:/dvrk/PSM1");
   command.add_option("--camera", options.camera,
                      "Images of a real arm: ros2:/topic or ros1:/topic, an Image or, where it ends in /compressed, a "
                      "CompressedImage; /dev/videoN; gst:PIPELINE, for example 'gst:decklinkvideosrc ! deinterlace'");

@@ -1,8 +1,10 @@
 #include "apps/lapservo/commands/servo/servo_options.h"
 
+#include <algorithm>
 #include <cstddef>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include <fmt/format.h>
@@ -45,6 +47,40 @@ ControllerConfig controller_of(const ServoOptions& options, const Rig& rig) {
   if (!options.joint_limits.empty()) config.limits = limits_of(options, rig);
   if (!options.controller.empty()) config = load_controller(options.controller, config);
   return checked(config);
+}
+
+std::string names_of(const Rig& rig) {
+  std::string names;
+  for (const Instrument& instrument : rig.instruments) names += (names.empty() ? "" : ", ") + instrument.name;
+  return names;
+}
+
+// PSM1 of ros2:/dvrk/PSM1, and of the simulated arm SIM_PSM1; empty without an arm.
+std::string arm_name(const std::string& robot) {
+  constexpr std::string_view simulated = "SIM_";
+  const std::size_t colon = robot.find(':');
+  if (colon == std::string::npos) return {};
+  const std::string name = robot.substr(robot.find_last_of(":/") + 1);
+  return name.rfind(simulated, 0) == 0 ? name.substr(simulated.size()) : name;
+}
+
+// That of --instrument, else that of the arm's name, else the first. Another arm's rig would move the wrong joints.
+Rig steered_rig(const ServoOptions& options) {
+  Rig rig = load_rig(options.rig);
+  const std::string arm = arm_name(options.robot);
+  const std::string wanted = options.instrument.empty() ? arm : options.instrument;
+  const auto found = std::find_if(rig.instruments.begin(), rig.instruments.end(),
+                                  [&](const Instrument& instrument) { return instrument.name == wanted; });
+  if (found != rig.instruments.end()) {
+    std::iter_swap(rig.instruments.begin(), found);
+  } else if (!options.instrument.empty()) {
+    throw InputError("--instrument", "is " + wanted + ", expected one of the rig's: " + names_of(rig));
+  } else if (!arm.empty() && !rig.instruments.empty()) {
+    throw InputError("--robot", fmt::format("is {}, and the rig has {}: expected the rig of that arm, or --instrument "
+                                            "{} where it is that arm's under another name",
+                                            arm, names_of(rig), rig.instruments.front().name));
+  }
+  return first_instrument(std::move(rig), options.rig);
 }
 
 // The paper's law comes with the paper's eyes.
@@ -114,7 +150,7 @@ void forget_registration(RunConfig& run, const ServoOptions& options) {
 
 RunConfig run_config_of(const ServoOptions& options) {
   RunConfig run;
-  run.rig = first_instrument(load_rig(options.rig), options.rig);
+  run.rig = steered_rig(options);
   run.controller = controller_of(options, run.rig);
   if (options.robot == "sim" || run.controller.mode != ControlMode::uncalibrated)
     run.rig = single_instrument(std::move(run.rig), options.rig);

@@ -16,9 +16,9 @@ namespace lapservo::app {
 
 /// Options of `lapservo servo`.
 struct ServoOptions {
-  std::string rig, robot, camera, joint_limits, trajectory = "paper", method = "default", tracker, controller,
-                                                delay = "estimate", out, replay, image_topic, joint_topic,
-                                                control = "page,topics", operator_present;
+  std::string rig, robot, instrument, camera, joint_limits, trajectory = "paper", method = "default", tracker,
+                                                            controller, delay = "estimate", out, replay, image_topic,
+                                                            joint_topic, control = "page,topics", operator_present;
   std::vector<double> set_point, via, start, rcm_px, hide;
   std::vector<double> registration_error;  // 3 x mm
   double latency_ms = 80;
