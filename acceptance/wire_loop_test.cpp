@@ -728,6 +728,7 @@ TEST_P(WireLoop, SurvivesWhenEitherSideIsKilledOrStopped) {
   sleep(0.5);
   EXPECT_LE(spy_->last_s(), fault_s + allowed_s + rest_s);
   room = arm();
+  expect_soon_said("restarted");
   ASSERT_TRUE(moves(300, [&] { start(); }));
   end(SIGKILL);
   EXPECT_EQ(servo(8)->wait(), 0) << said();

@@ -21,10 +21,11 @@ struct Scene {
   double backlash_rad = 0;  ///< of psi
   double backlash_m = 0;    ///< of rho
   bool moving = true;
-  double jitter_s = 0;  ///< of the images' stamps, one standard deviation
+  double jitter_s = 0;                    ///< of the images' stamps, one standard deviation
+  std::optional<Eigen::Vector4d> seen{};  ///< by another camera
 };
 
-std::optional<DelayEstimate> estimate_after(const Scene& scene, double duration_s, std::uint64_t seed) {
+DelayEstimator estimator_after(const Scene& scene, double duration_s, std::uint64_t seed) {
   Random random(seed);
   const Eigen::Vector4d offset(0.035, -0.035, 0.003, 0.035), noise(3e-4, 3e-4, 2e-4, 1e-3);
   DelayEstimator estimator;
@@ -36,13 +37,18 @@ std::optional<DelayEstimate> estimate_after(const Scene& scene, double duration_
     for (int i = 0; i < 4; ++i) measured[i] += 1e-5 * random.normal();
     history.push(t, measured);
     Eigen::Vector4d seen = truth(t - scene.delay_s + scene.jitter_s * random.normal()) + offset;
+    if (scene.seen) seen = *scene.seen;
     const Eigen::Vector4d ahead = truth(t - scene.delay_s + 1e-3) - truth(t - scene.delay_s);
     seen[2] -= std::copysign(scene.backlash_m / 2, ahead[2]);
     seen[3] -= std::copysign(scene.backlash_rad / 2, ahead[3]);
     for (int i = 0; i < 4; ++i) seen[i] += noise[i] * random.normal();
     estimator.add(t, seen, noise.cwiseAbs2().asDiagonal(), history);
   }
-  return estimator.estimate();
+  return estimator;
+}
+
+std::optional<DelayEstimate> estimate_after(const Scene& scene, double duration_s, std::uint64_t seed) {
+  return estimator_after(scene, duration_s, seed).estimate();
 }
 
 TEST(DelayEstimator, FindsTheDelayWithinHalfAFrame) {
@@ -54,6 +60,18 @@ TEST(DelayEstimator, FindsTheDelayWithinHalfAFrame) {
       ASSERT_TRUE(found);
       EXPECT_NEAR(found->delay_s, delay_s, 0.5 / 60);
     }
+  }
+}
+
+// Images of another arm, and those that are later than any delay that is looked for.
+TEST(DelayEstimator, ImagesThatNoDelayExplainsContradictIt) {
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    SCOPED_TRACE(seed);
+    EXPECT_TRUE(estimator_after({.seen = joints_at(0)}, 30, seed).is_contradicted());
+    EXPECT_TRUE(estimator_after({.delay_s = 1.5}, 30, seed).is_contradicted());
+    EXPECT_FALSE(
+        estimator_after({.delay_s = 0.2, .backlash_rad = 0.03, .backlash_m = 2e-4}, 30, seed).is_contradicted());
+    EXPECT_FALSE(estimator_after({.moving = false, .seen = joints_at(0)}, 30, seed).is_contradicted());
   }
 }
 

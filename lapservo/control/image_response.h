@@ -86,7 +86,7 @@ class ImageResponse {
   Eigen::Vector4d features_ = Eigen::Vector4d::Zero();  ///< of the image before
   Eigen::Matrix4d jacobian_ = Eigen::Matrix4d::Zero();  ///< of the features, as it was some motion ago
   Eigen::Matrix4d mixed_ = Eigen::Matrix4d::Zero();     ///< into a joint's motion from others', per error of the model
-  std::array<Eigen::Vector4d, delays> q_{};             ///< at it
+  std::array<Eigen::Vector4d, delays> q_{};             ///< the measured joints at the image before
   Point now_;
   std::array<Point, points> ring_;
   std::size_t next_ = 0, size_ = 0;

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "lapservo/control/motion_limits.h"
+#include "lapservo/core/printable.h"
 #include "lapservo/crtk/joint_map.h"
 
 namespace lapservo::internal {
@@ -236,8 +237,10 @@ JointState Interlock::state(double now_s) {
   state.follows = config_.motion_enabled;
   state.blocked = std::exchange(untold_, Blocked::none);
   if (measured_) state.time_s = measured_->time_s, state.q = JointVector::from_vector(measured_->q);
-  if (operating_state_)
-    state.operating_state = operating_state_from_string(operating_state_->state).value_or(OperatingState::disabled);
+  if (!operating_state_) return state;
+  const auto known = operating_state_from_string(operating_state_->state);
+  state.operating_state = known.value_or(OperatingState::disabled);
+  if (!known) state.other_state = printable(operating_state_->state);
   return state;
 }
 

@@ -252,6 +252,14 @@ TEST(Interlock, HoldsAtEveryFaultAndGoesOnAfterwards) {
   }
 }
 
+TEST(Interlock, AStateThatNobodyKnowsIsToldAsItIs) {
+  Bench bench;
+  bench.enable("READY\n");
+  const JointState state = bench.interlock.state(bench.now_s);
+  EXPECT_EQ(state.operating_state, OperatingState::disabled);
+  EXPECT_EQ(state.other_state, "READY?");
+}
+
 // A fault of no time at all, between two ticks: what was sent before is not taken up as if nothing had happened.
 TEST(Interlock, TellsOfAFaultHoweverShort) {
   const std::vector<std::pair<Blocked, std::function<void(Bench&)>>> faults{

@@ -11,6 +11,7 @@
 
 #include "lapservo/core/error.h"
 #include "lapservo/core/lower_case.h"
+#include "lapservo/core/printable.h"
 #include "lapservo/io/overlay.h"
 #include "lapservo/io/pictures/jpeg_encoding.h"
 #include "lapservo/robot/steady_clock.h"
@@ -44,13 +45,6 @@ std::string plain_words(const std::string& text) {
   std::string plain;
   for (std::string word; words >> word;) plain += (plain.empty() ? "" : " ") + word;
   return plain;
-}
-
-std::string printable(const std::string& text) {
-  constexpr std::size_t longest = 40;
-  std::string shown = text.substr(0, longest);
-  for (char& c : shown) c = c >= ' ' && c <= '~' ? c : '?';
-  return shown;
 }
 
 std::string topic(const Rig& rig, const std::string& name) {

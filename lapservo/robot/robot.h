@@ -1,5 +1,6 @@
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "lapservo/core/joint_vector.h"
@@ -24,6 +25,8 @@ struct JointState {
   /// The first reason since the last call of Robot::state() for which the arm must not be moved, however short it was.
   /// Reasons that follow from the other fields may be left to the Supervisor.
   Blocked blocked = Blocked::none;
+  /// The state as the arm names it, where that is no OperatingState ("READY"): operating_state is disabled then.
+  std::string other_state{};
 };
 
 /// The joints at one time, on the loop's clock.

@@ -50,7 +50,7 @@ Supervisor::Supervisor(Robot& robot, const Clock& clock, const SupervisorConfig&
 
 JointState Supervisor::state() {
   JointState state = robot_.state();
-  operating_state_ = state.operating_state;
+  operating_state_ = state.other_state.empty() ? to_string(state.operating_state) : state.other_state;
   input_.time_s = clock_.now_s();
   input_.arm = arm_of(state, input_.time_s, config_.max_reading_age_s);
   input_.follows = state.follows;
@@ -105,8 +105,7 @@ Blocked Supervisor::blocked() const {
 }
 
 std::string Supervisor::remedy() const {
-  if (state_.obstacle == Blocked::not_enabled)
-    return fmt::format("the arm is {}: enable it", to_string(operating_state_));
+  if (state_.obstacle == Blocked::not_enabled) return fmt::format("the arm is {}: enable it", operating_state_);
   return std::string(internal::word_of(remedies, state_.obstacle));
 }
 

@@ -59,7 +59,7 @@ class Supervisor : public Robot {
   SupervisorInput input_;
   SupervisorState state_;
   std::optional<JointPath> path_;  ///< the last one sent
-  OperatingState operating_state_ = OperatingState::disabled;
+  std::string operating_state_;    ///< as the arm calls it
   std::string loop_reason_;
   std::function<bool()> is_present_;
   double suspended_s_;  ///< Clock::suspended_s() in the step before

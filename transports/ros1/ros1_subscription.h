@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <ros/callback_queue.h>
@@ -103,12 +104,21 @@ class Ros1Subscription {
     if (!event.getConnectionHeaderPtr() || event.getPublisherName() == ros::this_node::getName()) return;
     const auto received = event.getMessage();
     if (auto& message = received->message) {
-      if constexpr (requires { message->source; }) message->source = std::hash<std::string>()(event.getPublisherName());
+      if constexpr (requires { message->source; }) message->source = source_of(event);
       handler_(std::move(*message));
     } else if (unreadable_++ == 0) {
       std::fprintf(stderr, "ROS: %s: dropping messages of %s that can't be read as %s\n", topic_.c_str(),
                    event.getPublisherName().c_str(), ros1_types<Message>().c_str());
     }
+  }
+  // A number for each connection: a node that is started again has its old name.
+  std::uint64_t source_of(const Event& event) {
+    Connection& connection = connections_[event.getPublisherName()];
+    if (connection.header != event.getConnectionHeaderPtr()) {
+      connection.header = event.getConnectionHeaderPtr();
+      ++connection.count;
+    }
+    return std::hash<std::string>()(event.getPublisherName()) + connection.count;
   }
   // A publisher of another type refuses, of which roscpp says nothing.
   void look_for_other_types() {
@@ -128,6 +138,11 @@ class Ros1Subscription {
   std::atomic<bool> ended_ = false;
   bool connected_ = false;  // or the reason was reported
   long unreadable_ = 0, refused_ = 0;
+  struct Connection {
+    boost::shared_ptr<ros::M_string> header;  // kept, so that no other one has its address
+    std::uint64_t count = 0;
+  };
+  std::map<std::string, Connection> connections_;  // of publishers, by their nodes' names; the thread's only
   std::thread thread_;
 };
 
