@@ -7,11 +7,13 @@ import json
 import os
 import pathlib
 import re
+import select
 import shutil
 import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 
 PATIENCE_S = 60
@@ -40,8 +42,10 @@ class Browser:
         for domain in ("Page", "Runtime", "Log", "Network"):
             self.call(domain + ".enable")
 
-    def read(self):
+    def read(self, awaited):
         while b"\0" not in self.buffer:
+            if not select.select([self.of], [], [], PATIENCE_S)[0]:
+                raise RuntimeError(f"Chromium did not answer {awaited} within {PATIENCE_S} s")
             part = os.read(self.of.fileno(), 65536)
             if not part:
                 raise RuntimeError("Chromium has ended")
@@ -57,7 +61,7 @@ class Browser:
         self.to.write(json.dumps(message).encode() + b"\0")
         self.to.flush()
         while True:
-            answer = self.read()
+            answer = self.read(method)
             if answer.get("id") == self.count:
                 if "error" in answer:
                     raise RuntimeError(f"{method}: {answer['error']}")
@@ -127,10 +131,15 @@ class Browser:
 def start(tool, *arguments):
     """lapservo and its page's address."""
     process = subprocess.Popen([tool, *arguments], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    impatience = threading.Timer(PATIENCE_S, process.kill)
+    impatience.start()
+    said = []
     for line in process.stdout:
+        said.append(line)
         if found := re.match(r"page: (\S+)", line):
+            impatience.cancel()
             return process, found[1]
-    raise AssertionError(f"lapservo {' '.join(arguments)} ended without a page")
+    raise AssertionError(f"lapservo {' '.join(arguments)} gave no page within {PATIENCE_S} s: {''.join(said)}")
 
 
 def state(browser, text):
@@ -179,7 +188,10 @@ def stop_process(process):
     """Returns when none of its threads runs any more."""
     process.send_signal(signal.SIGSTOP)
     tasks = pathlib.Path(f"/proc/{process.pid}/task")
-    while any(stat.read_text().rpartition(")")[2].split()[0] != "T" for stat in tasks.glob("*/stat")):
+    states = lambda: [stat.read_text().rpartition(")")[2].split()[0] for stat in tasks.glob("*/stat")]
+    end = time.monotonic() + PATIENCE_S
+    while any(one != "T" for one in states()):
+        assert time.monotonic() < end, f"lapservo's threads did not stop: {states()}"
         time.sleep(0.01)
 
 
@@ -272,7 +284,9 @@ def see_the_run_button(browser, tool, rig):
         assert browser.value("document.getElementById('start').hidden"), "there are two buttons that start"
         for name, (press, let_go) in ways.items():
             # On a computer that is busy with other things a press may be late, which is a release.
+            end = time.monotonic() + PATIENCE_S
             while not goes_on_tracking(browser, press):
+                assert time.monotonic() < end, f"{name}: does not go on: {browser.value('document.body.innerText')}"
                 browser.value("release()")
             let_go()
             gone = name == "a network that is gone"

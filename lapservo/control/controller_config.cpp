@@ -45,7 +45,8 @@ void check_limits(const JointLimits& limits, double period_s) {
     require(std::isfinite(limits.upper[i]) && limits.upper[i] > limits.lower[i], element("limits.upper", i),
             limits.upper[i], "a number above the lower limit");
   }
-  require(period_s <= 2 * stopping_time_s(limits), "period_s", period_s, "at most twice the joints' stopping time");
+  require(period_s <= 2 * stopping_time_s(limits), "period_s", period_s,
+          "at most twice the joints' stopping time, rate / acceleration: lower acceleration along with rate");
 }
 
 void check_window(const ImageWindow& window) {

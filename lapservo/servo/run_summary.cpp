@@ -67,16 +67,18 @@ void RunSummary::add(const ControlTick& tick, const std::optional<InstrumentTrut
     if (converged()) return;
     error.setConstant(std::numeric_limits<double>::infinity());  // not known, and so not small
   }
-  convergence_.add(tick.input.time_s - *start_s_, error);
+  convergence_.add(tick.input.time_s - *start_s_, error, holds);
 }
 
 std::string RunSummary::convergence_text() const {
   const auto reached_s = convergence_.reached_s();
   if (!reached_s) return "not within 1 px and 5 mrad for a second";
   const Eigen::Vector4d rms = convergence_.rms_since();
+  const long held = convergence_.held_since();
   return fmt::format(
-      "within 1 px and 5 mrad from {:.2f} s on; rms since: s {:.2f} mrad, r {:.2f}, l {:.2f}, d {:.2f} px", *reached_s,
-      1000 * rms[0], rms[1], rms[2], rms[3]);
+      "within 1 px and 5 mrad from {:.2f} s on; rms since{}: s {:.2f} mrad, r {:.2f}, l {:.2f}, d {:.2f} px",
+      *reached_s, held > 0 ? fmt::format(" while it tracked (held for {} ticks)", held) : "", 1000 * rms[0], rms[1],
+      rms[2], rms[3]);
 }
 
 std::string RunSummary::holds_text() const {

@@ -14,13 +14,13 @@ class RunSummaryTest : public ::testing::Test {
     tick.decision.control.action = action, tick.decision.control.reason = reason;
     tick.decision.registration_contradicted = contradicted;
     InstrumentTruth truth;
-    truth.features = Eigen::Vector4d::Zero();
+    truth.features = feature_error_rad * Eigen::Vector4d::UnitX();
     for (int i = 0; i < count; ++i, time_s += period_s) tick.input.time_s = time_s, summary.add(tick, truth, block);
   }
   bool says(const std::string& part) const { return summary.text().find(part) != std::string::npos; }
 
   RunSummary summary;
-  double time_s = 0;
+  double time_s = 0, feature_error_rad = 0;
   bool contradicted = false;
 };
 
@@ -34,6 +34,17 @@ TEST_F(RunSummaryTest, CountsHoldsByTheirReasonOrTheArms) {
   add(ControlAction::hold, HoldReason::marker_lost, 1);
   EXPECT_TRUE(says("ended in a hold: marker_lost")) << summary.text();
   EXPECT_FALSE(summary.succeeded(false));
+}
+
+// A marker that is hidden for long is no error of what was tracked.
+TEST_F(RunSummaryTest, ErrorsOfHoldsAreNoPartOfTheRms) {
+  add(ControlAction::track, HoldReason::none, 15);
+  EXPECT_TRUE(says("rms since: s 0.00 mrad")) << summary.text();
+  feature_error_rad = 0.5;
+  add(ControlAction::hold, HoldReason::marker_lost, 30);
+  feature_error_rad = 0;
+  add(ControlAction::track, HoldReason::none, 5);
+  EXPECT_TRUE(says("rms since while it tracked (held for 30 ticks): s 0.00 mrad")) << summary.text();
 }
 
 TEST_F(RunSummaryTest, AContradictedRegistrationIsNoSuccessWhenStrict) {
