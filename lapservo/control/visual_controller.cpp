@@ -81,7 +81,6 @@ ControlStep VisualController::step(double time_s, const Eigen::Vector4d& q_joint
   const bool timed = std::isfinite(time_s) && (!started_ || time_s > now_s_);
   step.reason = read(time_s, q_joint, desired, readings);
   if (timed && q_joint.allFinite()) {
-    if (image) note_arrival();
     if (image) image_reason_ = update(*image);
     watch_image_age();
     if (suspended_ == HoldReason::none) step.estimate = estimator_->at(time_s, q_joint);
@@ -195,21 +194,9 @@ void VisualController::watch_error(const DesiredFeatures& desired, const Control
   if (error_growth_.add(desired, step.error)) until_start_ = HoldReason::error_grows;
 }
 
-void VisualController::note_arrival() {
-  if (arrived_s_) gaps_s_[arrivals_++ % gaps_s_.size()] = now_s_ - *arrived_s_;
-  arrived_s_ = now_s_;
-}
-
-// Too few images a second would be stale between any two of them; a pause of some images is not that.
 void VisualController::watch_image_age() {
-  if (image_reason_ == HoldReason::slow_images) image_reason_ = HoldReason::none;
   if (now_s_ - usable_s_ > config_.stale_after_s && image_reason_ == HoldReason::none)
     image_reason_ = HoldReason::stale_image;
-  std::array<double, 5> gaps_s = gaps_s_;
-  std::nth_element(gaps_s.begin(), gaps_s.begin() + gaps_s.size() / 2, gaps_s.end());
-  const bool slow = gaps_s[gaps_s.size() / 2] > config_.stale_after_s;
-  if (slow && (image_reason_ == HoldReason::none || image_reason_ == HoldReason::stale_image))
-    image_reason_ = HoldReason::slow_images;
 }
 
 VisualController::Law VisualController::decide(HoldReason reason, const std::optional<Estimate>& estimate,

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <array>
-#include <cstddef>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -94,7 +92,6 @@ class VisualController {
   HoldReason update(const ImageMeasurement& image);
   void compare_motion(const ImageMeasurement& image);
   void watch_image_age();
-  void note_arrival();
   void watch_error(const DesiredFeatures& desired, const ControlStep& step);
   Law decide(HoldReason reason, const std::optional<Estimate>& estimate, const DesiredFeatures& desired) const;
   Law probing_law(const Eigen::Vector4d& velocity) const;
@@ -124,10 +121,7 @@ class VisualController {
   double now_s_ = 0;
   HoldReason image_reason_ = HoldReason::no_image_yet;  ///< of the latest image
   std::optional<double> image_s_;                       ///< stamp of the latest image
-  std::array<double, 5> gaps_s_{};                      ///< between the arrivals of the latest images
-  std::optional<double> arrived_s_;
-  std::size_t arrivals_ = 0;
-  double usable_s_ = 0;  ///< when the last usable one arrived
+  double usable_s_ = 0;                                 ///< when the last usable one arrived
   double needed_since_s_ = -std::numeric_limits<double>::infinity();
 };
 

@@ -203,22 +203,6 @@ TEST(VisualController, CopesWithDroppedFramesFastStepsAndTheirJitter) {
   }
 }
 
-// Fewer than ten images a second: held once, not by turns.
-TEST(VisualController, HoldsThroughoutWhereImagesAreTooFew) {
-  for (const long frame_every : {5L, 8L}) {
-    Flaws flaws = usual_flaws();
-    flaws.frame_every = frame_every;
-    const auto done = run(flaws, set_point(paper_sinusoids().offset), 10, 5);
-    int changes = 0, held = 0;
-    for (std::size_t k = 60; k < done.moments.size(); ++k) {
-      changes += done.moments[k].step.reason != done.moments[k - 1].step.reason;
-      held += done.moments[k].step.reason == HoldReason::slow_images;
-    }
-    EXPECT_EQ(changes, 0) << frame_every;
-    EXPECT_EQ(held > 0, frame_every == 8) << frame_every;
-  }
-}
-
 TEST(VisualController, SendsNothingBeforeTheFirstMeasuredJoints) {
   VisualController controller({}, testing::model_of({}));
   const auto nothing = controller.step(0, Eigen::Vector4d::Constant(NAN), {}, {});
