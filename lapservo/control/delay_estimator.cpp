@@ -11,6 +11,11 @@ namespace {
 
 constexpr double frames_alike = 4;  // whose errors are the same
 
+template <class Grid>
+auto likeliest(const Grid& grid) {
+  return std::min_element(grid.begin(), grid.end(), [](const auto& a, const auto& b) { return a.squares < b.squares; });
+}
+
 }  // namespace
 
 void DelayEstimator::add(double stamp_s, const Eigen::Vector4d& q_image, const Eigen::Matrix4d& covariance,
@@ -44,8 +49,7 @@ void DelayEstimator::add(double stamp_s, const Eigen::Vector4d& q_image, const E
 
 std::optional<DelayEstimate> DelayEstimator::estimate() const {
   if (seen_s_ < config_.min_time_s) return std::nullopt;
-  const auto lowest = std::min_element(grid_.begin(), grid_.end(),
-                                       [](const Candidate& a, const Candidate& b) { return a.squares < b.squares; });
+  const auto lowest = likeliest(grid_);
   const auto index = static_cast<std::size_t>(lowest - grid_.begin());
   const std::size_t middle = std::clamp<std::size_t>(index, 1, candidates - 2);
   const double left = grid_[middle - 1].squares, centre = grid_[middle].squares, right = grid_[middle + 1].squares;
@@ -65,8 +69,7 @@ bool DelayEstimator::is_contradicted() const {
   constexpr double times = 5, min_time_s = 5, unexplained = 0.5, misfit = 9;
   const double expected_sigma_s = std::sqrt(frames_alike / information_per_s2_);
   if (!(seen_s_ > min_time_s && times * expected_sigma_s < config_.max_sigma_s)) return false;
-  const auto lowest = std::min_element(grid_.begin(), grid_.end(),
-                                       [](const Candidate& a, const Candidate& b) { return a.squares < b.squares; });
+  const auto lowest = likeliest(grid_);
   const bool at_end = lowest + 1 == grid_.end();
   return lowest->squares > misfit * 4 * weight_ && (at_end || lowest->squares > unexplained * squares_);
 }

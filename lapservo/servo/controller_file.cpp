@@ -32,8 +32,9 @@ JointLimits read_limits(const YamlField& map, JointLimits limits) {
                                        {"rate", &limits.rate, joint_rates},
                                        {"acceleration", &limits.acceleration, joint_accelerations}})
     if (const YamlField field = map[key]; field.present()) {
-      *values = four(field);
-      expect_radians_and_metres(field, field.numbers<4>("a list of four numbers"), units);
+      const auto numbers = field.numbers<4>("a list of four numbers");
+      expect_radians_and_metres(field, numbers, units);
+      *values = Eigen::Vector4d(numbers.data());
     }
   expect_keys(map, {{"lower", "upper", "rate", "acceleration"}, {}});
   return limits;
