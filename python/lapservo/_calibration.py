@@ -121,8 +121,9 @@ class RegistrationCalibration(Calibration):
     camera_from_rcm: float[4, 4], metres; sigma_translation_m: float[3]; sigma_quaternion_xyzw: float[4], None where the
     rotation is a convention or the rig's, as sigma_rotation_rad. With joints: sigma_offset and backlash float[4] (rad,
     rad, m, rad), image_delay_s and its sigma; None without. residuals: float[N, 4], a row a frame: time [s], place [m],
-    axis [rad], roll [rad]; without joints the place is how far the axis misses the RCM. unknown: what these data don't
-    determine, a sentence each.
+    axis [rad], roll [rad]; without joints the place is how far the axis misses the RCM. faults: of the joints'
+    readings, that show beyond the noise and count in the sigmas; unknown: what these data don't determine; a sentence
+    each.
     """
 
     instrument: str
@@ -135,6 +136,7 @@ class RegistrationCalibration(Calibration):
     sigma_image_delay_s: Optional[float]
     backlash: Optional[list[float]] = field(repr=False)
     residuals: _Array = field(repr=False)
+    faults: list[str] = field(repr=False)
     unknown: list[str] = field(repr=False)
 
     @property

@@ -277,6 +277,7 @@ py::dict calibrate_registration(const py::object& frames, const py::object& rig,
   result["sigma_image_delay_s"] = arm ? std::optional(arm->sigma_image_delay_s) : std::nullopt;
   result["backlash"] = arm ? std::optional(arm->backlash) : std::nullopt;
   result["residuals"] = residuals_of(registration);
+  result["faults"] = registration.faults;
   result["unknown"] = registration.unknown;
   return result;
 }

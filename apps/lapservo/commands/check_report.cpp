@@ -142,9 +142,12 @@ std::vector<CheckLine> arm_lines(const ArmCheck& arm) {
   const bool rig = !arm.by_rig.empty();
   std::vector<CheckLine> lines{
       {"reprojection", (rig ? fmt::format("{:.2f} px rms; ", rms(arm.by_rig, px)) : "") +
-                           fmt::format("{:.2f} px after a calibration", rms(arm.at_best, px))},
+                           fmt::format("{:.2f} px after a calibration, {:.1f} times the images' noise",
+                                       rms(arm.at_best, px), arm.noise_across)},
       {"rotation against encoder",
-       rig && !arm.beyond_encoder.empty() ? fmt::format("{:.1f} mrad rms", rms(arm.beyond_encoder, psi)) : "unknown"},
+       (rig && !arm.beyond_encoder.empty() ? fmt::format("{:.1f} mrad rms; ", rms(arm.beyond_encoder, psi)) : "") +
+           fmt::format("{:.1f} mrad after a calibration, {:.1f} times the images' noise",
+                       1e3 * rms(arm.at_best, &ArmResidual::roll_rad), arm.noise_roll)},
       {"focal length", "off by " + told(arm.focal, 100, "%")},
       {"drift", "the marker moves by " + told(arm.drift_m, 1e3, "mm") + " over the recording, directions by " +
                     told(arm.drift_rad, 1e3, "mrad")},

@@ -6,8 +6,8 @@
 
 #include <Eigen/Geometry>
 
-#include "lapservo/calibration/marker/frame_fit.h"
-#include "lapservo/calibration/registration/arm_model.h"
+#include "lapservo/calibration/check/rig_limits.h"
+#include "lapservo/calibration/registration/arm_fit.h"
 #include "lapservo/calibration/registration/arm_start.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/core/statistics.h"
@@ -21,29 +21,13 @@ namespace {
 // Smaller faults than these are not taken out of the others: they would widen them for nothing.
 constexpr double least_focal = 2e-3, least_drift_m = 0.5e-3, least_drift_rad = 2e-3;
 
-struct Fitted {
-  ArmModel model;
-  FrameFit fit;
-  Eigen::MatrixXd covariance;
-};
-
-std::optional<Fitted> fitted(const Instrument& instrument, const ArmStart& start, const JointRecording& recording,
-                             const ArmFaults& faults) {
-  ArmModel model(instrument, start, recording, faults);
-  auto fit = fit_frames([&](const Eigen::VectorXd& x) { return model.residuals(x); }, model.unknowns(),
-                        2 * poses_per_second(start.poses));
-  if (!fit) return std::nullopt;
-  Eigen::MatrixXd covariance = arm_covariance(*fit);
-  return Fitted{std::move(model), std::move(*fit), std::move(covariance)};
-}
-
-Told focal_of(const Fitted& f) {
+Told focal_of(const ArmFit& f) {
   const Block& focal = f.model.blocks().focal;
   return {focal.of(f.fit.x).norm(), std::sqrt(focal.of(f.covariance).trace())};
 }
 
 // By how much the marker in the middle of its work moves in the camera over the recording.
-Told drift_of_place(const Fitted& f) {
+Told drift_of_place(const ArmFit& f) {
   const Block& drift = f.model.blocks().drift;
   const Rigid3 camera_from_rcm = f.model.camera_from_rcm(f.fit.x);
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
@@ -56,7 +40,7 @@ Told drift_of_place(const Fitted& f) {
   return {(by_drift * drift.of(f.fit.x)).norm(), std::sqrt(std::max(0.0, covariance.trace()))};
 }
 
-Told drift_of_directions(const Fitted& f) {
+Told drift_of_directions(const ArmFit& f) {
   const Block& drift = f.model.blocks().drift;
   return {drift.of(f.fit.x).tail<3>().norm(), std::sqrt(drift.of(f.covariance).bottomRightCorner<3, 3>().trace())};
 }
@@ -94,7 +78,7 @@ std::vector<ArmResidual> residuals(const Instrument& instrument, const Camera& c
 }
 
 // By how much the fit's registration may be off at the markers: place, direction and turn.
-Eigen::Vector3d registration_sigmas(const Fitted& f) {
+Eigen::Vector3d registration_sigmas(const ArmFit& f) {
   const Eigen::MatrixXd& c = f.covariance;
   const ArmModel::Blocks& blocks = f.model.blocks();
   const double turn_rad = std::sqrt(blocks.rotation.of(c).trace());
@@ -113,17 +97,23 @@ ArmCheck check_arm(const Instrument& instrument, const Camera& camera, const std
                    const std::vector<TrackedPsi>& tracked, const JointRecording& recording, const std::string& source) {
   ArmCheck check;
   const ArmStart start = start_arm(instrument, poses, recording, source);
-  if (!start.refusal.empty()) return check.refusal = start.refusal, check;
+  if (!start.refusal.empty()) {
+    const std::string fault = explaining_fault(instrument, poses, recording, source, nullptr);
+    return check.refusal = fault.empty() ? start.refusal : fault, check;
+  }
   check.region = ranges_text(*instrument.joints, start.ranges);
-  const auto full = fitted(instrument, start, recording, {true, true});
+  const auto full = fit_arm(instrument, start, recording, {true, true});
   if (!full) return check.refusal = std::string("the motion leaves the registration open: ") + swing_more, check;
   check.focal = focal_of(*full);
   check.drift_m = drift_of_place(*full), check.drift_rad = drift_of_directions(*full);
   const ArmFaults there{check.focal.exceeds(least_focal),
                         check.drift_m.exceeds(least_drift_m) || check.drift_rad.exceeds(least_drift_rad)};
-  const auto best = fitted(instrument, start, recording, there);
+  const auto best = fit_arm(instrument, start, recording, there);
   if (!best) return check.refusal = std::string("the motion leaves the registration open: ") + swing_more, check;
 
+  check.noise_across = best->noise.head<2>().maxCoeff(), check.noise_roll = best->noise[5];
+  check.noise = best->noise.maxCoeff();
+  if (check.noise > rig_limits.noise) check.fault = explaining_fault(instrument, poses, recording, source, &*best);
   const Eigen::VectorXd& x = best->fit.x;
   const Rigid3 camera_from_rcm = best->model.camera_from_rcm(x);
   const Joints joints = best->model.joints(x);

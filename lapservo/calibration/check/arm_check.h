@@ -36,10 +36,13 @@ struct ArmCheck {
   std::string refusal;
   std::string region;                        ///< between which readings each joint moved: all of this holds there
   std::vector<ArmResidual> by_rig, at_best;  ///< as the rig has it, and as it would after a calibration
-  std::vector<TrackedPsi> beyond_encoder;    ///< psi as it is tracked less what the joints say, in [-pi, pi)
-  Told focal;                                ///< relative error of the focal length
-  Told drift_m, drift_rad;                   ///< of the marker, over the recording, and of the directions
-  std::optional<Told> delay_s;               ///< error of the rig's image_delay_s, when it has one
+  /// How many times the images' noise residuals are after a calibration: in the image, about the axis, anywhere.
+  double noise_across = 1, noise_roll = 1, noise = 1;
+  std::string fault;                       ///< of the joints' readings, that explains a large one; empty when none does
+  std::vector<TrackedPsi> beyond_encoder;  ///< psi as it is tracked less what the joints say, in [-pi, pi)
+  Told focal;                              ///< relative error of the focal length
+  Told drift_m, drift_rad;                 ///< of the marker, over the recording, and of the directions
+  std::optional<Told> delay_s;             ///< error of the rig's image_delay_s, when it has one
   double measured_delay_s = 0;
   /// camera_from_rcm and joints: rms over the frames of where they put the marker, at its place, direction and turn.
   std::optional<Told> place_m, axis_rad, roll_rad;

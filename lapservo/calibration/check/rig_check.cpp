@@ -59,7 +59,7 @@ class Advisor {
   explicit Advisor(const RigFindings& findings) : f_(findings) {}
 
   std::vector<Advice> all() {
-    light(), colours(), response(), camera(), print(), movement(), delay(), registration(), found(), view();
+    light(), colours(), response(), camera(), print(), movement(), joints(), delay(), registration(), found(), view();
     std::stable_sort(advice_.begin(), advice_.end(),
                      [](const Advice& a, const Advice& b) { return a.needed > b.needed; });
     return std::move(advice_);
@@ -158,6 +158,22 @@ class Advisor {
     if (f_.rcm && f_.rcm->refusal.empty()) moves(f_.rcm->drift_m, {});
   }
 
+  void joints() {
+    if (!f_.arm || !f_.arm->refusal.empty() || !(f_.arm->noise > rig_limits.noise)) return;
+    const ArmCheck& arm = *f_.arm;
+    const double place_m = rms(arm.at_best, &ArmResidual::position_m),
+                 axis_rad = rms(arm.at_best, &ArmResidual::axis_rad),
+                 roll_rad = rms(arm.at_best, &ArmResidual::roll_rad);
+    add(place_m > rig_limits.place_m || axis_rad > rig_limits.axis_rad || roll_rad > rig_limits.roll_rad,
+        fmt::format(
+            "joints and images disagree by {:.0f} times the images' noise after any calibration ({:.1f} mm, {:.0f} "
+            "mrad of the axis, {:.0f} mrad about it): {}",
+            arm.noise, 1e3 * place_m, 1e3 * axis_rad, 1e3 * roll_rad,
+            arm.fault.empty() ? "no one fault of the joints' readings explains it" : arm.fault),
+        "mend that, record the marker and the joints again, then lapservo check",
+        "the same in each pose that the joints give");
+  }
+
   void delay() {
     if (!f_.arm || !f_.arm->refusal.empty()) return;
     const auto& delay = f_.arm->delay_s;
@@ -180,7 +196,7 @@ class Advisor {
     }
     if (f_.arm) {
       if (!f_.arm->refusal.empty()) {
-        add(true, "what the joints say can't be compared: " + f_.arm->refusal,
+        add(true, "joints and images can't be compared: " + f_.arm->refusal,
             "record the marker and the joints again, then lapservo check", "delay, registration and focal length");
         return;
       }

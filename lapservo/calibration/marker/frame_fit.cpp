@@ -16,19 +16,28 @@ namespace {
 // Residuals and their derivatives at one x, which all frames' cost functions read.
 struct Linearisation {
   const FrameResiduals& model;
-  const std::vector<Unknown>& unknowns;
+  const std::vector<Unknown>& unknowns;  // those that are fitted, then those that are held
+  const Eigen::VectorXd& held;
   Eigen::MatrixXd residuals;
-  std::vector<Eigen::MatrixXd> slopes;  // one a number, as residuals
+  std::vector<Eigen::MatrixXd> slopes;  // one a number that is fitted, as residuals
 
   void update(const Eigen::VectorXd& x, bool with_slopes) {
-    residuals = model(x);
+    residuals = model(with_held(x));
     if (!with_slopes) return;
     slopes.clear();
-    for (Eigen::Index i = 0; i < x.size(); ++i) {
-      const double size = unknowns[static_cast<std::size_t>(i)].step;
-      const Eigen::VectorXd step = size * Eigen::VectorXd::Unit(x.size(), i);
-      slopes.push_back((model(x + step) - model(x - step)) / (2 * size));
-    }
+    for (Eigen::Index i = 0; i < x.size(); ++i) slopes.push_back(slope(x, i));
+  }
+
+  Eigen::VectorXd with_held(const Eigen::VectorXd& x) const {
+    Eigen::VectorXd all(x.size() + held.size());
+    all << x, held;
+    return all;
+  }
+
+  Eigen::MatrixXd slope(const Eigen::VectorXd& x, Eigen::Index of) const {
+    const double size = unknowns[static_cast<std::size_t>(of)].step;
+    const Eigen::VectorXd all = with_held(x), step = size * Eigen::VectorXd::Unit(all.size(), of);
+    return (model(all + step) - model(all - step)) / (2 * size);
   }
 
   // Derivatives of one frame: channels x numbers.
@@ -90,10 +99,12 @@ class PriorCost : public ceres::CostFunction {
   const Eigen::VectorXd& inverse_sigmas_;
 };
 
-Eigen::VectorXd inverse_priors(const std::vector<Unknown>& unknowns) {
-  Eigen::VectorXd inverse(static_cast<Eigen::Index>(unknowns.size()));
-  for (std::size_t i = 0; i < unknowns.size(); ++i)
-    inverse[static_cast<Eigen::Index>(i)] = unknowns[i].prior > 0 ? 1 / unknowns[i].prior : 0;
+Eigen::VectorXd inverse_priors(const std::vector<Unknown>& unknowns, Eigen::Index fitted) {
+  Eigen::VectorXd inverse(fitted);
+  for (Eigen::Index i = 0; i < fitted; ++i) {
+    const double prior = unknowns[static_cast<std::size_t>(i)].prior;
+    inverse[i] = prior > 0 ? 1 / prior : 0;
+  }
   return inverse;
 }
 
@@ -111,7 +122,7 @@ bool solve(Linearisation& at, Eigen::VectorXd& x, const Eigen::VectorXd& weights
   ceres::Problem problem(options);
   for (Eigen::Index i = 0; i < at.residuals.cols(); ++i)
     problem.AddResidualBlock(new FrameCost(at, i, weights, static_cast<int>(x.size())), &loss, x.data());
-  const Eigen::VectorXd priors = inverse_priors(at.unknowns);
+  const Eigen::VectorXd priors = inverse_priors(at.unknowns, x.size());
   problem.AddResidualBlock(new PriorCost(priors), nullptr, x.data());
   ceres::Solver::Options solver;
   solver.linear_solver_type = ceres::DENSE_NORMAL_CHOLESKY;
@@ -147,7 +158,7 @@ std::optional<Covariances> covariances(const Linearisation& at, const Eigen::Vec
     information += trust * product(jacobian.transpose(), jacobian);
     gradients.col(i) = trust * product(jacobian.transpose(), residual);
   }
-  const Eigen::VectorXd priors = inverse_priors(at.unknowns).cwiseAbs2();
+  const Eigen::VectorXd priors = inverse_priors(at.unknowns, numbers).cwiseAbs2();
   information.diagonal() += priors;
   // In units of what each number alone would be known to: else metres and radians hide what is open.
   const Eigen::VectorXd units = information.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
@@ -168,6 +179,31 @@ std::optional<Covariances> covariances(const Linearisation& at, const Eigen::Vec
   return Covariances{freedom * product(product(inverse, scatter), inverse), inverse};
 }
 
+// By the numbers that are held.
+Departures departures_at(const Linearisation& at, const Eigen::VectorXd& x, const Eigen::VectorXd& weights,
+                         std::size_t alike_frames) {
+  const Eigen::Index channels = at.residuals.rows(), frames = at.residuals.cols(), numbers = x.size(),
+                     rows = channels * frames;
+  const double scale = loss_scale(channels);
+  LinearFit fit{{}, Eigen::VectorXd::Zero(rows + numbers), {}, alike_frames, unmodelled_sigmas};
+  Eigen::MatrixXd jacobian(rows + numbers, numbers), weighed(channels, frames);
+  for (Eigen::Index i = 0; i < frames; ++i) {
+    const Eigen::VectorXd residual = weights.cwiseProduct(at.residuals.col(i));
+    weighed.col(i) = weights / std::sqrt(1 + residual.squaredNorm() / (scale * scale));
+    fit.groups.push_back(channels * i);
+    fit.residuals.segment(channels * i, channels) = weighed.col(i).cwiseProduct(at.residuals.col(i));
+    jacobian.middleRows(channels * i, channels) = weighed.col(i).asDiagonal() * at.jacobian(i);
+  }
+  fit.groups.push_back(rows);
+  const Eigen::VectorXd priors = inverse_priors(at.unknowns, numbers);
+  jacobian.bottomRows(numbers) = priors.asDiagonal(), fit.residuals.tail(numbers) = priors.cwiseProduct(x);
+  fit.jacobian = jacobian.sparseView();
+  Eigen::MatrixXd slopes = Eigen::MatrixXd::Zero(rows + numbers, at.held.size());
+  for (Eigen::Index k = 0; k < slopes.cols(); ++k)
+    slopes.col(k).head(rows) = weighed.cwiseProduct(at.slope(x, numbers + k)).reshaped();
+  return departures_of(fit, slopes);
+}
+
 }  // namespace
 
 Block add_block(std::vector<Unknown>& unknowns, const std::vector<Unknown>& added) {
@@ -177,10 +213,12 @@ Block add_block(std::vector<Unknown>& unknowns, const std::vector<Unknown>& adde
 }
 
 std::optional<FrameFit> fit_frames(const FrameResiduals& residuals, const std::vector<Unknown>& unknowns,
-                                   std::size_t alike_frames, const AtIteration& at_iteration) {
-  Eigen::VectorXd x(static_cast<Eigen::Index>(unknowns.size()));
-  for (std::size_t i = 0; i < unknowns.size(); ++i) x[static_cast<Eigen::Index>(i)] = unknowns[i].start;
-  Linearisation at{residuals, unknowns, residuals(x), {}};
+                                   std::size_t alike_frames, const AtIteration& at_iteration, std::size_t held) {
+  Eigen::VectorXd starts(static_cast<Eigen::Index>(unknowns.size()));
+  for (std::size_t i = 0; i < unknowns.size(); ++i) starts[static_cast<Eigen::Index>(i)] = unknowns[i].start;
+  const Eigen::VectorXd stays = starts.tail(static_cast<Eigen::Index>(held));
+  Eigen::VectorXd x = starts.head(starts.size() - stays.size());
+  Linearisation at{residuals, unknowns, stays, residuals(starts), {}};
   if (!at.residuals.allFinite()) return std::nullopt;
   Eigen::VectorXd scales = robust_scales(at.residuals);
   for (int round = 0; round < 6; ++round) {
@@ -194,7 +232,12 @@ std::optional<FrameFit> fit_frames(const FrameResiduals& residuals, const std::v
   }
   const auto sigma = covariances(at, scales.cwiseInverse(), alike_frames);
   if (!sigma || !sigma->scattered.allFinite() || !sigma->independent.allFinite()) return std::nullopt;
-  return FrameFit{x, sigma->scattered, sigma->independent, at.residuals, scales};
+  return FrameFit{x,
+                  sigma->scattered,
+                  sigma->independent,
+                  at.residuals,
+                  scales,
+                  departures_at(at, x, scales.cwiseInverse(), alike_frames)};
 }
 
 }  // namespace lapservo::internal

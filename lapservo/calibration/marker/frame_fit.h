@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 
 #include "lapservo/calibration/fit/at_iteration.h"
+#include "lapservo/calibration/fit/departures.h"
 
 namespace lapservo::internal {
 
@@ -21,6 +22,7 @@ struct FrameFit {
   Eigen::MatrixXd independent;  ///< of x, if no residual went with another: the inverse of the information
   Eigen::MatrixXd residuals;    ///< at x
   Eigen::VectorXd scales;       ///< of each channel: its residuals' robust standard deviation
+  Departures departures;        ///< by the numbers that were held
 };
 
 /// One number of x before the fit.
@@ -42,9 +44,15 @@ struct Block {
 Block add_block(std::vector<Unknown>& unknowns, const std::vector<Unknown>& added);
 
 /// Least squares over frames with Cauchy's loss (Ceres). Channels are weighed by their own scatter. The covariance
-/// holds for residuals that stay alike over `alike_frames` neighbouring ones (Newey and West 1987). Nullopt when the
-/// solver fails or the residuals leave a number open.
+/// holds for residuals that stay alike over `alike_frames` neighbouring ones (Newey and West 1987). The last
+/// `held` unknowns stay as they start and are no part of x and the covariances. Nullopt when the solver fails or the
+/// residuals leave a number open.
 std::optional<FrameFit> fit_frames(const FrameResiduals& residuals, const std::vector<Unknown>& unknowns,
-                                   std::size_t alike_frames, const AtIteration& at_iteration = {});
+                                   std::size_t alike_frames, const AtIteration& at_iteration = {},
+                                   std::size_t held = 0);
+
+/// Times sigma: what goes with the pose (the side of the marker that is seen, a codec's habits) is neither noise nor
+/// common to all frames, and in no covariance. On rendered motions it doubles the errors (docs/notes/calibration.md).
+inline constexpr double unmodelled_sigmas = 2;
 
 }  // namespace lapservo::internal

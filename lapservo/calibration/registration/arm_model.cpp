@@ -19,7 +19,11 @@ Eigen::MatrixXd arm_covariance(const FrameFit& fit) {
 
 ArmModel::ArmModel(const Instrument& instrument, const ArmStart& start, const JointRecording& recording,
                    const ArmFaults& faults)
-    : marker_(instrument.marker), poses_(start.poses), recording_(refined(recording, 5e-3)), guess_(start.guess) {
+    : marker_(instrument.marker),
+      poses_(start.poses),
+      recording_(refined(recording, 5e-3)),
+      guess_(start.guess),
+      faults_(faults.joints) {
   constexpr std::array<double, 4> least_travel{0.05, 0.05, 5e-3, 0.05};
   for (std::size_t j = 0; j < 4; ++j) {
     const auto [low, high] = std::minmax_element(recording.joints.begin(), recording.joints.end(),
@@ -48,10 +52,14 @@ void ArmModel::add_unknowns(double delay_s, const ArmFaults& faults) {
   for (const std::size_t joint : moving_) backlash.push_back({0, joint == 2 ? step_m : step_rad});
   blocks_.backlash = add(backlash);
   if (faults.focal) blocks_.focal = add({{0, step, focal_prior}});
-  if (!faults.drift) return;
-  std::vector<Unknown> drift(3, {0, step_m, drift_prior_m});
-  drift.insert(drift.end(), 3, {0, step_rad, drift_prior_rad});
-  blocks_.drift = add(drift);
+  if (faults.drift) {
+    std::vector<Unknown> drift(3, {0, step_m, drift_prior_m});
+    drift.insert(drift.end(), 3, {0, step_rad, drift_prior_rad});
+    blocks_.drift = add(drift);
+  }
+  std::vector<Unknown> joints;
+  for (const JointFault& fault : faults.joints) joints.push_back({0, fault.step});
+  blocks_.joints = add(joints);
 }
 
 Rigid3 ArmModel::camera_from_rcm(const Eigen::VectorXd& x) const {
@@ -98,13 +106,22 @@ Eigen::MatrixXd ArmModel::residuals(const Eigen::VectorXd& x) const {
   return all;
 }
 
+JointRecording ArmModel::mended(const Eigen::VectorXd& x) const {
+  JointRecording recording = recording_;
+  for (std::size_t k = 0; k < faults_.size(); ++k)
+    if (const double size = blocks_.joints.of(x)[static_cast<Eigen::Index>(k)]; size != 0)
+      faults_[k].mend(recording, size);
+  return recording;
+}
+
 // A width below 0 is an instrument that leads as one above 0 lets it lag: derivatives go through 0.
 JointRecording ArmModel::behind_backlash(const Eigen::VectorXd& x) const {
-  JointRecording instrument = recording_;
+  const JointRecording motors = mended(x);
+  JointRecording instrument = motors;
   for (std::size_t k = 0; k < moving_.size(); ++k) {
     const std::size_t j = moving_[k];
     const double width = blocks_.backlash.of(x)[static_cast<Eigen::Index>(k)], size = std::abs(width);
-    Backlash gap(recording_.joints.front()[j]);
+    Backlash gap(motors.joints.front()[j]);
     for (auto& joints : instrument.joints) {
       gap.follow(joints[j], size);
       const double behind = gap.instrument(size) - joints[j];

@@ -7,22 +7,21 @@
 #include "lapservo/calibration/marker/frame_fit.h"
 #include "lapservo/calibration/recording/joint_recording.h"
 #include "lapservo/calibration/registration/arm_start.h"
+#include "lapservo/calibration/registration/joint_faults.h"
 #include "lapservo/calibration/registration/timed_pose.h"
 #include "lapservo/rig/rig.h"
 
 namespace lapservo::internal {
 
-/// Times sigma: what goes with the pose (the side of the marker that is seen, a codec's habits) is neither noise nor
-/// common to all frames, and in no covariance. On rendered motions it doubles the errors (docs/notes/calibration.md).
-inline constexpr double unmodelled_sigmas = 2;
 /// Sigmas of an arm's numbers: from the residuals' scatter, times this, but nowhere smaller than from the information
 /// alone: in directions that the motion leaves open, residuals scatter little.
 Eigen::MatrixXd arm_covariance(const FrameFit& fit);
 
 /// Which faults an arm's model may have beside a wrong registration.
 struct ArmFaults {
-  bool focal = false;  ///< the camera's focal length is another: needs TimedPose::by_focal
-  bool drift = false;  ///< what the RCM frame moves by in the camera over the recording, steadily
+  bool focal = false;                ///< the camera's focal length is another: needs TimedPose::by_focal
+  bool drift = false;                ///< what the RCM frame moves by in the camera over the recording, steadily
+  std::vector<JointFault> joints{};  ///< with a size
 };
 
 /// Where a marker is seen, as its arm's joints have it.
@@ -40,6 +39,7 @@ class ArmModel {
     Block backlash;  ///< of those joints that move
     Block focal;     ///< relative change of the focal length; empty without this fault, as the next
     Block drift;     ///< of the RCM frame from the first pose to the last: place (3, camera frame), turn (3, RCM frame)
+    Block joints;    ///< sizes of the joints' faults
   };
 
   ArmModel(const Instrument& instrument, const ArmStart& start, const JointRecording& recording,
@@ -58,6 +58,7 @@ class ArmModel {
   const std::vector<TimedPose>& poses() const { return poses_; }
 
  private:
+  JointRecording mended(const Eigen::VectorXd& x) const;
   JointRecording behind_backlash(const Eigen::VectorXd& x) const;
   void add_unknowns(double delay_s, const ArmFaults& faults);
   Rigid3 camera_from_rcm_at(const Eigen::VectorXd& x, double time_s) const;
@@ -69,6 +70,7 @@ class ArmModel {
   JointRecording recording_;
   ArmGuess guess_;
   std::vector<std::size_t> moving_;
+  std::vector<JointFault> faults_;
   std::vector<Unknown> unknowns_;
   Blocks blocks_;
 };

@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 
 #include "lapservo/calibration/marker/frame_fit.h"
-#include "lapservo/calibration/registration/arm_model.h"
+#include "lapservo/calibration/registration/arm_fit.h"
 #include "lapservo/calibration/registration/arm_start.h"
 #include "lapservo/calibration/registration/axes_meeting_point.h"
 #include "lapservo/core/statistics.h"
@@ -69,9 +69,10 @@ double common_turn_rad(const std::vector<TimedPose>& poses) {
   return 0.5 * median(sigmas_rad);
 }
 
-void report_arm(const ArmModel& model, const FrameFit& fit, Registration& result) {
+void report_arm(const ArmFit& fitted, Registration& result) {
+  const auto& [model, fit, covariance, noise, faults] = fitted;
+  result.faults = faults;
   result.camera_from_rcm = model.camera_from_rcm(fit.x);
-  const Eigen::MatrixXd covariance = arm_covariance(fit);
   const Eigen::VectorXd sigma = covariance.diagonal().cwiseMax(0).cwiseSqrt();
   const ArmModel::Blocks& blocks = model.blocks();
   const Eigen::Matrix3d turn = blocks.rotation.of(covariance);
@@ -95,6 +96,33 @@ void report_arm(const ArmModel& model, const FrameFit& fit, Registration& result
                                 r.segment<2>(3).norm() * pose.marker.sigma_axis_rad / std::sqrt(2.0),
                                 std::abs(r[5]) * pose.marker.sigma_roll_rad});
   }
+}
+
+struct Largest {
+  double m, rad;
+};
+
+Largest largest_sigma(const Registration& registration) {
+  const auto& sigma_offset = registration.arm->sigma_offset;
+  return {std::max(registration.sigma_translation_m.norm(), sigma_offset[2]),
+          std::max({registration.sigma_rotation_rad, sigma_offset[1], sigma_offset[3]})};
+}
+
+// Rms, without the tenth that is worst: an angle that wraps, a wrong pose.
+Largest largest_residual(const Registration& registration) {
+  const auto most = [&](double RegistrationResidual::*size) {
+    std::vector<double> sizes;
+    for (const RegistrationResidual& residual : registration.residuals) sizes.push_back(residual.*size);
+    std::sort(sizes.begin(), sizes.end());
+    sizes.resize(sizes.size() - sizes.size() / 10);
+    return rms(sizes);
+  };
+  return {most(&RegistrationResidual::position_m),
+          std::max(most(&RegistrationResidual::axis_rad), most(&RegistrationResidual::roll_rad))};
+}
+
+std::string misfit_text(const std::string& fault) {
+  return "the joints do not move as the marker does: " + fault;
 }
 
 Rigid3 placed(const Marker& marker, const Registration& registration, const std::array<double, 4>& readings,
@@ -172,24 +200,37 @@ Registration register_rcm(const Instrument& instrument, const std::vector<TimedP
 Registration register_arm(const Instrument& instrument, const std::vector<TimedPose>& poses,
                           const JointRecording& recording, const std::string& source, const AtIteration& at_iteration) {
   Registration result;
+  const auto explained = [&](const ArmFit* fit) {
+    return explaining_fault(instrument, poses, recording, source, fit, at_iteration);
+  };
   const ArmStart start = start_arm(instrument, poses, recording, source);
-  if (!start.refusal.empty()) return result.refusal = start.refusal, result;
-  const ArmModel model(instrument, start, recording);
-  const auto fit = fit_frames([&](const Eigen::VectorXd& x) { return model.residuals(x); }, model.unknowns(),
-                              2 * poses_per_second(start.poses), at_iteration);
+  if (!start.refusal.empty()) {
+    const std::string fault = explained(nullptr);
+    return result.refusal = fault.empty() ? start.refusal : misfit_text(fault), result;
+  }
+  const auto fit = fit_arm(instrument, start, recording, {}, at_iteration);
   if (!fit)
     return result.refusal =
                "the motion leaves the registration open: " + travels_text(start.guess.joints, start.ranges) + ": " +
                swing_more,
            result;
-  report_arm(model, *fit, result);
+  report_arm(*fit, result);
   result.arm->ranges = start.ranges;
-  const auto& sigma_offset = result.arm->sigma_offset;
-  const double sigma_m = std::max(result.sigma_translation_m.norm(), sigma_offset[2]);
-  const double sigma_rad = std::max({result.sigma_rotation_rad, sigma_offset[1], sigma_offset[3]});
-  if (sigma_m > max_sigma_m || sigma_rad > max_sigma_rad)
-    result.refusal = fmt::format("it would be known to {:.1f} mm and {:.2f} degrees only; {}: {}", 1e3 * sigma_m,
-                                 57.3 * sigma_rad, travels_text(start.guess.joints, start.ranges), swing_more);
+  const Largest sigma = largest_sigma(result), off = largest_residual(result);
+  const bool is_open = sigma.m > max_sigma_m || sigma.rad > max_sigma_rad,
+             is_misfit = off.m > max_sigma_m || off.rad > max_sigma_rad;
+  if (is_open || is_misfit) {
+    if (const std::string fault = explained(&*fit); !fault.empty() || !fit->faults.empty())
+      result.refusal = misfit_text(fault.empty() ? fit->faults.front() : fault);
+    else if (is_misfit)
+      result.refusal = fmt::format(
+          "the marker is {:.1f} mm and {:.0f} mrad rms from where the joints have it, {:.0f} times the images' noise: "
+          "is it this arm's recording, is the focal length the camera's, does something move or slip",
+          1e3 * off.m, 1e3 * off.rad, fit->noise.maxCoeff());
+    else
+      result.refusal = fmt::format("it would be known to {:.1f} mm and {:.2f} degrees only; {}: {}", 1e3 * sigma.m,
+                                   57.3 * sigma.rad, travels_text(start.guess.joints, start.ranges), swing_more);
+  }
   result.unknown.emplace_back("theta's offset is the rig's: camera_from_rcm turns with it");
   return result;
 }

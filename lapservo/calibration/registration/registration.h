@@ -43,6 +43,8 @@ struct Registration {
   };
   std::optional<Arm> arm;
 
+  /// Faults of the joints' readings that show beyond the noise, one sentence each: the sigmas count them.
+  std::vector<std::string> faults;
   std::vector<std::string> unknown;  ///< quantities that these data do not determine, one sentence each
   std::vector<RegistrationResidual> residuals;
 };
@@ -64,7 +66,8 @@ Registration register_rcm(const Instrument& instrument, const std::vector<TimedP
                           const AtIteration& at_iteration = {});
 
 /// camera_from_rcm, joints.sign, joints.offset and image_delay_s, with the backlash between readings and instrument,
-/// whatever of them the instrument knows; its `joints` names the columns. Refused where a joint stood still. theta's
+/// whatever of them the instrument knows; its `joints` names the columns. Refused where a joint stood still, and where
+/// poses and joints disagree by more than a registration may be off, with the fault that explains it. theta's
 /// offset stays the rig's, and of the two ways to turn the RCM frame (z up or down, with the signs of theta and phi)
 /// that nearer to the rig's camera_from_rcm, else that of its theta's sign. Throws InputError when the recording and
 /// the frames have no time in common, naming `source`.

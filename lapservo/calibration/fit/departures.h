@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include <Eigen/Core>
+#include <Eigen/SparseCore>
+
+namespace lapservo::internal {
+
+/// A fit of numbers x by least squares at its solution; residuals and slopes in units of the noise.
+struct LinearFit {
+  Eigen::SparseMatrix<double> jacobian;  ///< a row a residual (a prior is one, too), a column a number of x
+  Eigen::VectorXd residuals;
+  std::vector<Eigen::Index> groups;  ///< the first row of each group of residuals, as those of a frame; last, their end
+  std::size_t alike_groups = 1;      ///< over so many neighbouring groups noise stays alike
+  double unmodelled_sigmas = 1;      ///< how many times as far off as the residuals' scatter makes it a number may be
+};
+
+/// A number that the model takes for 0, as the residuals have it.
+struct Fault {
+  std::size_t which;
+  double size, sigma;
+};
+
+/// How far data depart from a model.
+struct Departures {
+  std::vector<Fault> seen;     ///< beyond chance, the clearest first: each fitted beside x and those before it
+  std::vector<Fault> instead;  ///< that would be seen without those: each fitted beside x alone
+  /// Mean squares and products of what x is off by, which was fitted without them.
+  Eigen::MatrixXd by_seen, by_instead;
+};
+
+/// To first order. `slopes`: of the residuals, a column a fault.
+Departures departures_of(const LinearFit& fit, const Eigen::MatrixXd& slopes);
+
+}  // namespace lapservo::internal

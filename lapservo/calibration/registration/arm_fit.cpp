@@ -1,0 +1,145 @@
+#include "lapservo/calibration/registration/arm_fit.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "lapservo/core/statistics.h"
+
+namespace lapservo::internal {
+namespace {
+
+// By a quantile, so that a few wrong poses do not count and a part of the recording does.
+Eigen::VectorXd noise_of(const Eigen::MatrixXd& residuals) {
+  constexpr double part = 0.9, of_normal = 1.645;
+  Eigen::VectorXd noise(residuals.rows());
+  for (Eigen::Index channel = 0; channel < residuals.rows(); ++channel) {
+    const Eigen::VectorXd sizes = residuals.row(channel).cwiseAbs();
+    noise[channel] = quantile_of({sizes.begin(), sizes.end()}, part) / of_normal;
+  }
+  return noise;
+}
+
+struct ModelFit {
+  ArmModel model;
+  FrameFit fit;
+};
+
+std::optional<ModelFit> fit_model(const Instrument& instrument, const ArmStart& start, const JointRecording& recording,
+                                  const ArmFaults& free, const std::vector<JointFault>& held,
+                                  const AtIteration& at_iteration) {
+  ArmFaults faults = free;
+  faults.joints.insert(faults.joints.end(), held.begin(), held.end());
+  ArmModel model(instrument, start, recording, faults);
+  auto fit = fit_frames([&](const Eigen::VectorXd& x) { return model.residuals(x); }, model.unknowns(),
+                        2 * poses_per_second(start.poses), at_iteration, held.size());
+  if (!fit) return std::nullopt;
+  return ModelFit{std::move(model), std::move(*fit)};
+}
+
+// More of them explain nothing better.
+std::vector<TimedPose> some_of(const std::vector<TimedPose>& poses) {
+  constexpr std::size_t enough = 120;
+  std::vector<TimedPose> some;
+  for (std::size_t i = 0; i < poses.size(); i += 1 + poses.size() / enough) some.push_back(poses[i]);
+  return some;
+}
+
+// The noise that a fault leaves, and the fault in words.
+struct Explanation {
+  Eigen::VectorXd noise;
+  std::string text;
+
+  // A geometric mean: a fault that shows in some channels only is not hidden by the others.
+  double left() const { return noise.array().log().mean(); }
+};
+
+class Explainer {
+ public:
+  Explainer(const Instrument& instrument, const std::vector<TimedPose>& poses, const JointRecording& recording,
+            const std::string& source, const AtIteration& at_iteration)
+      : instrument_(instrument),
+        poses_(some_of(poses)),
+        recording_(recording),
+        source_(source),
+        at_iteration_(at_iteration) {}
+
+  void try_fault(const JointFault& fault, double start_size) {
+    JointRecording recording = recording_;
+    const bool has_size = fault.step > 0;
+    if (!has_size || start_size != 0) fault.mend(recording, start_size);
+    const ArmStart start = start_arm(instrument_, poses_, recording, source_);
+    if (!start.refusal.empty()) return;
+    ArmFaults free;
+    if (has_size) free.joints.push_back(fault);
+    const auto fitted = fit_model(instrument_, start, recording, free, {}, at_iteration_);
+    if (!fitted) return;
+    const double more = has_size ? fitted->model.blocks().joints.of(fitted->fit.x)[0] : 0;
+    Explanation explained{noise_of(fitted->fit.residuals), fault.text((1 + start_size) * (1 + more) - 1)};
+    if (!best_ || explained.left() < best_->left()) best_ = std::move(explained);
+  }
+
+  const std::optional<Explanation>& best() const { return best_; }
+
+ private:
+  const Instrument& instrument_;
+  std::vector<TimedPose> poses_;
+  const JointRecording& recording_;
+  const std::string& source_;
+  const AtIteration& at_iteration_;
+  std::optional<Explanation> best_;
+};
+
+// Of those with a size, the ones that a fit without them sees; all where there is no such fit.
+std::vector<JointFault> possible_faults(const Joints& joints, const std::vector<TimedPose>& poses, const ArmFit* fit) {
+  std::vector<JointFault> faults = other_joint_faults(joints);
+  const auto sized = sized_joint_faults(joints, poses);
+  if (!fit) faults.insert(faults.end(), sized.begin(), sized.end());
+  if (!fit) return faults;
+  const Departures& departures = fit->fit.departures;
+  for (const auto* seen : {&departures.seen, &departures.instead})
+    for (const Fault& one : *seen) faults.push_back(sized[one.which]);
+  return faults;
+}
+
+}  // namespace
+
+std::optional<ArmFit> fit_arm(const Instrument& instrument, const ArmStart& start, const JointRecording& recording,
+                              const ArmFaults& free, const AtIteration& at_iteration) {
+  const auto faults = sized_joint_faults(instrument.joints.value(), start.poses);
+  auto fitted = fit_model(instrument, start, recording, free, faults, at_iteration);
+  if (!fitted) return std::nullopt;
+  ArmFit result{std::move(fitted->model), std::move(fitted->fit), {}, {}, {}};
+  result.noise = noise_of(result.fit.residuals);
+  result.covariance = arm_covariance(result.fit);
+  if (result.fit.departures.seen.empty()) return result;
+  // To first order only: with those that are seen free, the fit shows by how much they put it off.
+  ArmFaults with = free;
+  for (const Fault& seen : result.fit.departures.seen) with.joints.push_back(faults[seen.which]);
+  const auto without_bias = fit_model(instrument, start, recording, with, faults, at_iteration);
+  if (!without_bias) return std::nullopt;
+  const auto& [model, fit] = *without_bias;
+  const Eigen::Index numbers = result.fit.x.size();
+  const Eigen::VectorXd bias = result.fit.x - fit.x.head(numbers);
+  const Departures &with_seen = fit.departures, &without = result.fit.departures;
+  result.covariance = (arm_covariance(fit) + with_seen.by_seen).topLeftCorner(numbers, numbers) +
+                      bias * bias.transpose() + without.by_instead;
+  for (std::size_t k = free.joints.size(); k < with.joints.size(); ++k)
+    result.faults.push_back(with.joints[k].text(model.blocks().joints.of(fit.x)[static_cast<Eigen::Index>(k)]));
+  return result;
+}
+
+std::string explaining_fault(const Instrument& instrument, const std::vector<TimedPose>& poses,
+                             const JointRecording& recording, const std::string& source, const ArmFit* fit,
+                             const AtIteration& at_iteration) {
+  Explainer explainer(instrument, poses, recording, source, at_iteration);
+  for (const JointFault& fault : possible_faults(instrument.joints.value(), poses, fit))
+    for (const double start : fault.starts) explainer.try_fault(fault, start);
+  constexpr double most_left = 3, least_gain = 1.5;  // times the noise
+  const auto& best = explainer.best();
+  if (!best || best->noise.maxCoeff() > most_left) return {};
+  const bool gains = !fit || fit->noise.cwiseQuotient(best->noise).maxCoeff() > least_gain;
+  return gains ? best->text : std::string();
+}
+
+}  // namespace lapservo::internal

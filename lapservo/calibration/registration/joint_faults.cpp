@@ -1,0 +1,164 @@
+#include "lapservo/calibration/registration/joint_faults.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/core/statistics.h"
+
+namespace lapservo::internal {
+namespace {
+
+bool is_length(std::size_t joint) {
+  return joint == 2;
+}
+
+double frame_period_s(const std::vector<TimedPose>& poses) {
+  std::vector<double> periods_s;
+  for (std::size_t i = 1; i < poses.size(); ++i) periods_s.push_back(poses[i].time_s - poses[i - 1].time_s);
+  return periods_s.empty() ? 1 : median(periods_s);
+}
+
+JointFault scale_fault(const std::string& name, std::size_t j) {
+  return {[=](double size) {
+            return fmt::format(
+                "{} moves by {:.3f} times its readings: check its unit, its gear and its encoder's scale", name,
+                1 + size);
+          },
+          [j](JointRecording& r, double size) {
+            for (auto& at : r.joints) at[j] *= 1 + size;
+          },
+          1e-4};
+}
+
+JointFault coupling_fault(const Joints& joints, std::size_t j, std::size_t by) {
+  return {[joints, j, by](double size) {
+            return fmt::format(
+                "{} moves with the readings of {} too, by {:.3g} {}: these joints are coupled; record the joints' "
+                "positions, not the motors'",
+                joints.names[j], joints.names[by], size,
+                is_length(j)    ? "m/rad"
+                : is_length(by) ? "rad/m"
+                                : "rad/rad");
+          },
+          [j, by](JointRecording& r, double size) {
+            for (auto& at : r.joints) at[j] += size * at[by];
+          },
+          is_length(j) ? 1e-5 : 1e-4};
+}
+
+JointFault lag_fault(const std::string& name, std::size_t j) {
+  return {[=](double size) {
+            return fmt::format("the readings of {} are {:.0f} ms {} than the other joints': stamp all joints alike",
+                               name, 1e3 * std::abs(size), size > 0 ? "later" : "earlier");
+          },
+          [j](JointRecording& r, double size) {
+            const JointRecording before = r;
+            for (std::size_t i = 0; i < r.joints.size(); ++i)
+              if (const auto at = before.at(r.time_s[i] + size)) r.joints[i][j] = (*at)[j];
+          },
+          1e-3};
+}
+
+// Of usual rates of cameras and of folders.
+std::vector<double> clock_starts(double images_per_s) {
+  std::vector<double> starts{0};
+  for (const double rate : {5.0, 6.0, 7.5, 8.0, 10.0, 12.5, 15.0, 20.0, 24.0, 25.0, 30.0, 50.0, 60.0})
+    if (std::abs(rate / images_per_s - 1) > 0.02) starts.push_back(rate / images_per_s - 1);
+  return starts;
+}
+
+JointFault clock_fault(double period_s) {
+  return {[=](double size) {
+            return fmt::format(
+                "the images' clock runs {:.4f} times as fast as the joints': if they are {:.4g} images a second, "
+                "read as {:.4g}, give --fps; else stamp both by one clock",
+                1 + size, (1 + size) / period_s, 1 / period_s);
+          },
+          [](JointRecording& r, double size) {
+            for (double& time_s : r.time_s) time_s *= 1 + size;
+          },
+          1e-4, clock_starts(1 / period_s)};
+}
+
+JointFault lost_frames_fault(double from_s) {
+  return {[=](double size) {
+            return fmt::format(
+                "from about {:.1f} s on, images are stamped {:.0f} ms {}: frames are {} there; record again without "
+                "lost frames",
+                from_s, 1e3 * std::abs(size), size < 0 ? "too early" : "too late", size < 0 ? "missing" : "repeated");
+          },
+          [from_s](JointRecording& r, double size) {
+            double last_s = r.time_s.front();
+            for (double& time_s : r.time_s) {
+              if (time_s > from_s) time_s = std::max(time_s + size, last_s + 1e-6);
+              last_s = time_s;
+            }
+          },
+          1e-3};
+}
+
+void unwrap(JointRecording& r) {
+  for (std::size_t j = 0; j < 4; ++j) {
+    if (is_length(j)) continue;
+    double turns = 0;
+    for (std::size_t i = 1; i < r.joints.size(); ++i) {
+      const double step = r.joints[i][j] + turns - r.joints[i - 1][j];
+      turns -= two_pi * std::round(step / two_pi);
+      r.joints[i][j] += turns;
+    }
+  }
+}
+
+// The first of each run of equal readings is when it was read.
+void drop_repeated(JointRecording& r) {
+  JointRecording fresh;
+  for (std::size_t i = 0; i < r.joints.size(); ++i)
+    if (i == 0 || i + 1 == r.joints.size() || r.joints[i] != r.joints[i - 1])
+      fresh.time_s.push_back(r.time_s[i]), fresh.joints.push_back(r.joints[i]);
+  r.time_s = fresh.time_s, r.joints = fresh.joints;
+}
+
+}  // namespace
+
+std::vector<JointFault> sized_joint_faults(const Joints& joints, const std::vector<TimedPose>& poses) {
+  constexpr int parts = 8;
+  std::vector<JointFault> faults;
+  for (std::size_t j = 0; j < 4; ++j) {
+    faults.push_back(scale_fault(joints.names[j], j)), faults.push_back(lag_fault(joints.names[j], j));
+    for (std::size_t by = 0; by < 4; ++by)
+      if (by != j && !is_length(by)) faults.push_back(coupling_fault(joints, j, by));
+  }
+  faults.push_back(clock_fault(frame_period_s(poses)));
+  const double first_s = poses.front().time_s, span_s = poses.back().time_s - first_s;
+  for (int part = 1; part < parts; ++part) faults.push_back(lost_frames_fault(first_s + span_s * part / parts));
+  return faults;
+}
+
+std::vector<JointFault> other_joint_faults(const Joints& joints) {
+  std::vector<JointFault> faults;
+  for (std::size_t j = 0; j < 4; ++j)
+    for (std::size_t k = j + 1; k < 4; ++k)
+      faults.push_back({[joints, j, k](double) {
+                          return fmt::format("{} and {} are exchanged: joints.names has theta, phi, rho, psi",
+                                             joints.names[j], joints.names[k]);
+                        },
+                        [j, k](JointRecording& r, double) {
+                          for (auto& at : r.joints) std::swap(at[j], at[k]);
+                        }});
+  faults.push_back({[](double) { return std::string("an angle wraps: record it without jumps of a turn"); },
+                    [](JointRecording& r, double) { unwrap(r); }});
+  faults.push_back({[](double) {
+                      return std::string(
+                          "readings are held: each is there several times; record them at the rate "
+                          "at which they are new");
+                    },
+                    [](JointRecording& r, double) { drop_repeated(r); }});
+  return faults;
+}
+
+}  // namespace lapservo::internal

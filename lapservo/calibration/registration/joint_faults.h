@@ -1,0 +1,29 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "lapservo/calibration/recording/joint_recording.h"
+#include "lapservo/calibration/registration/timed_pose.h"
+#include "lapservo/rig/rig.h"
+
+namespace lapservo::internal {
+
+/// One way in which a recording's readings are not those of the arm that the images show.
+struct JointFault {
+  /// What it is and what helps, for readings that have it with this size.
+  std::function<std::string(double size)> text;
+  /// Mends readings that have it with this size.
+  std::function<void(JointRecording&, double size)> mend;
+  double step = 0;                   ///< for derivatives by the size; 0: it is there or not, and has no size
+  std::vector<double> starts = {0};  ///< from where a fit of its size may have to begin
+};
+
+/// Scales, couplings and times of the joints, the clock, frames that are lost: faults with a size, of which 0 is none.
+std::vector<JointFault> sized_joint_faults(const Joints& joints, const std::vector<TimedPose>& poses);
+
+/// Columns that are exchanged, angles that wrap, readings that are held.
+std::vector<JointFault> other_joint_faults(const Joints& joints);
+
+}  // namespace lapservo::internal
