@@ -39,13 +39,15 @@ class CalibratedNumber:
 class Calibration:
     """The fields of every calibration.
 
-    `rig` is the Rig with what was measured; `yaml` the same as the command line writes it.
+    `rig` is the Rig with what was measured; `yaml` the same as the command line writes it. `faults`: of the recording,
+    that show beyond the noise and count in the sigmas, a sentence each.
     """
 
     rig: Any = field(repr=False)
     yaml: str = field(repr=False)
     numbers: list[CalibratedNumber] = field(repr=False)
     complaint: str = field(repr=False)
+    faults: list[str] = field(repr=False)
 
     def save(self, path: _Path) -> None:
         """Writes `yaml`, whole or not at all; a camera's own file is named so that it is found from there.
@@ -59,13 +61,14 @@ class Calibration:
 class CameraCalibration(Calibration):
     """Matrix, distortion, lateral chromatic aberration and response, from images of a board.
 
-    rms_px: what edges miss the fit by. views: name, corners, rms [px] of each image that was used. advice: what more
-    images should show, or ''. sigma_response: of encoded values (0 to 1), None where the images don't determine the
-    response. sharpening: its strength, 0 for none.
+    rms_px: what edges miss the fit by, noise: how many times their own noise that is. views: name, corners, rms [px] of
+    each image that was used. advice: what more images should show, or ''. sigma_response: of encoded values (0 to 1),
+    None where the images don't determine the response. sharpening: its strength, 0 for none.
     """
 
     camera: Any
     rms_px: float
+    noise: float
     views: list[tuple[str, int, float]] = field(repr=False)
     without_board: list[str] = field(repr=False)
     advice: str
@@ -121,9 +124,8 @@ class RegistrationCalibration(Calibration):
     camera_from_rcm: float[4, 4], metres; sigma_translation_m: float[3]; sigma_quaternion_xyzw: float[4], None where the
     rotation is a convention or the rig's, as sigma_rotation_rad. With joints: sigma_offset and backlash float[4] (rad,
     rad, m, rad), image_delay_s and its sigma; None without. residuals: float[N, 4], a row a frame: time [s], place [m],
-    axis [rad], roll [rad]; without joints the place is how far the axis misses the RCM. faults: of the joints'
-    readings, that show beyond the noise and count in the sigmas; unknown: what these data don't determine; a sentence
-    each.
+    axis [rad], roll [rad]; without joints the place is how far the axis misses the RCM. unknown: what these data don't
+    determine, a sentence each.
     """
 
     instrument: str
@@ -136,7 +138,6 @@ class RegistrationCalibration(Calibration):
     sigma_image_delay_s: Optional[float]
     backlash: Optional[list[float]] = field(repr=False)
     residuals: _Array = field(repr=False)
-    faults: list[str] = field(repr=False)
     unknown: list[str] = field(repr=False)
 
     @property

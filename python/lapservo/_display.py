@@ -81,7 +81,7 @@ def _marker(marker: Any) -> str:
 
 def _calibration_table(result: _calibration.Calibration) -> str:
     rows = [[n.name, _number(n.before), _number(n.after), _number(n.sigma)] for n in result.numbers]
-    notes = [result.complaint]
+    notes = [result.complaint, *result.faults]
     if isinstance(result, _calibration.CameraCalibration):
         caption = f"Camera: edges of {len(result.views)} views miss the fit by {result.rms_px:.3f} px rms"
         notes.append(f"Better still: {result.advice}" if result.advice else "")

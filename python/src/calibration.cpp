@@ -78,7 +78,7 @@ py::dict result_of(std::optional<GivenRig> measured, const Camera& camera, const
   py::list rows;
   for (const CalibratedNumber& n : numbers) rows.append(py::make_tuple(n.name, n.before, n.after, n.sigma));
   py::dict result("yaml"_a = measured ? rig_yaml(measured->rig, measured->path) : camera_yaml(camera),
-                  "numbers"_a = rows, "complaint"_a = complaint, "rig"_a = py::none());
+                  "numbers"_a = rows, "complaint"_a = complaint, "faults"_a = py::list(), "rig"_a = py::none());
   if (!measured) return result;
   // Absolute: who saves it may stand in another folder by then.
   fs::path& camera_file = measured->rig.camera_file;
@@ -126,6 +126,8 @@ py::dict calibrate_camera(const py::list& pictures, const std::string& corners, 
     views.append(py::make_tuple(measured.views[i].name, measured.views[i].corners.size(), calibration.view_rms_px[i]));
   result["camera"] = camera;
   result["rms_px"] = calibration.rms_px;
+  result["noise"] = calibration.noise;
+  result["faults"] = calibration.faults;
   result["views"] = views;
   result["without_board"] = without_board;
   result["advice"] = measured.advice;
@@ -225,6 +227,7 @@ py::dict calibrate_marker(const py::object& frames, const py::object& rig, const
   result["seam_views"] = calibration.seam_views;
   result["before_px"] = calibration.before_px;
   result["after_px"] = calibration.after_px;
+  result["faults"] = calibration.faults;
   result["seam_may_lag"] = calibration.seam_may_lag;
   return result;
 }

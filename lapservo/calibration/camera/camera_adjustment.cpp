@@ -7,6 +7,8 @@
 #include <cstddef>
 #include <utility>
 
+#include "lapservo/calibration/fit/departures.h"
+#include "lapservo/calibration/fit/linear_fit.h"
 #include "lapservo/calibration/fit/robust_scale.h"
 #include "lapservo/calibration/fit/solve_quietly.h"
 #include "lapservo/geometry/rotation.h"
@@ -30,6 +32,8 @@ struct ViewUnknowns {
 };
 
 constexpr double loss_scale_sigmas = 3;
+// Neighbouring edges err alike: by so many times an edge's own sigma a fault may be off.
+constexpr double unmodelled_sigmas = 1.3;
 // The common error of neighbouring edges, which a fit of one does not show: a floor for its sigma.
 constexpr double least_sigma_px = 0.01;
 constexpr double shift_sigma_px = 0.2;
@@ -38,9 +42,10 @@ struct EdgeCost {
   EdgePoint point;
   double sigma_px;
 
+  // The point's image beyond the principal point.
   template <typename T>
-  bool operator()(const T* focal_px, const T* aspect, const T* centre_px, const T* distortion, const T* k3,
-                  const T* magnifications, const T* shifts_px, const T* pose, const T* wider_px, T* residual) const {
+  std::array<T, 2> projected(const T* focal_px, const T* aspect, const T* distortion, const T* k3,
+                             const T* magnifications, const T* shifts_px, const T* pose) const {
     const T on_board[3] = {T(point.point_m.x()), T(point.point_m.y()), T(point.point_m.z())};
     T p[3];
     ceres::AngleAxisRotatePoint(pose, on_board, p);
@@ -55,7 +60,13 @@ struct EdgeCost {
       const int other = point.channel == 0 ? 0 : 1;
       u = magnifications[other] * u + shifts_px[2 * other], v = magnifications[other] * v + shifts_px[2 * other + 1];
     }
-    u += centre_px[0], v += centre_px[1];
+    return {u, v};
+  }
+  template <typename T>
+  bool operator()(const T* focal_px, const T* aspect, const T* centre_px, const T* distortion, const T* k3,
+                  const T* magnifications, const T* shifts_px, const T* pose, const T* wider_px, T* residual) const {
+    const auto [x, y] = projected(focal_px, aspect, distortion, k3, magnifications, shifts_px, pose);
+    const T u = x + centre_px[0], v = y + centre_px[1];
     const T beyond = T(point.normal.x()) * (point.raw_px.x() - u) + T(point.normal.y()) * (point.raw_px.y() - v);
     residual[0] = (beyond + T(point.towards_bright) * wider_px[point.channel]) / sigma_px;
     return true;
@@ -65,6 +76,11 @@ struct EdgeCost {
     (*this)(&c.focal_px, &c.aspect, c.centre_px.data(), c.distortion.data(), &c.k3, c.magnifications.data(),
             c.shifts_px.data(), view.pose.data(), view.wider_px.data(), &residual);
     return residual;
+  }
+  Eigen::Vector2d projected(const CameraUnknowns& c, const ViewUnknowns& view) const {
+    const auto [x, y] = projected(&c.focal_px, &c.aspect, c.distortion.data(), &c.k3, c.magnifications.data(),
+                                  c.shifts_px.data(), view.pose.data());
+    return {x, y};
   }
   void add_to(ceres::Problem& problem, CameraUnknowns& c, ViewUnknowns& view) const {
     problem.AddResidualBlock(
@@ -108,12 +124,71 @@ Rigid3 pose_of(const ViewUnknowns& view) {
   return {rotation_by({p[0], p[1], p[2]}), {p[3], p[4], p[5]}};
 }
 
+using Kind = CameraFault::Kind;
+
+// Each fault that there may be, of size 0.
+std::vector<CameraFault> possible_faults(std::size_t views) {
+  std::vector<CameraFault> faults(3, {Kind::bent_board});
+  faults.push_back({Kind::stretched_board});
+  for (std::size_t view = 0; view < views; ++view)
+    for (const Kind kind : {Kind::zoom, Kind::centre, Kind::centre, Kind::rolling_shutter, Kind::rolling_shutter})
+      faults.push_back({kind, view});
+  return faults;
+}
+constexpr Eigen::Index board_faults = 4, view_faults = 5;
+
+// Slopes of a residual by the faults of the board, then by those of its view.
+Eigen::Matrix<double, 1, board_faults + view_faults> slopes_of(const EdgeCost& cost, const CameraUnknowns& c,
+                                                               const ViewUnknowns& view, double board_m,
+                                                               double height_px) {
+  const auto by_point = [&](const Eigen::Vector3d& step_m) {
+    EdgeCost moved = cost;
+    moved.point.point_m += step_m;
+    return moved.residual(c, view) - cost.residual(c, view);
+  };
+  const Eigen::Vector2d at_px = cost.projected(c, view), at = cost.point.point_m.head<2>() / board_m;
+  const Eigen::Vector2d& normal = cost.point.normal;
+  const double row = at_px.y() / height_px, step = 1e-5;
+  const auto bent = [&](double part) { return by_point({0, 0, step * part}) / step; };
+  Eigen::Matrix<double, 1, board_faults + view_faults> slopes;
+  slopes << bent(at.x() * at.x()), bent(at.x() * at.y()), bent(at.y() * at.y()),
+      by_point({step * cost.point.point_m.x(), 0, 0}) / step, -normal.dot(at_px) / cost.sigma_px,
+      -normal.x() / cost.sigma_px, -normal.y() / cost.sigma_px, -normal.x() * row / cost.sigma_px,
+      -normal.y() * row / cost.sigma_px;
+  return slopes;
+}
+
+using Costs = std::vector<std::vector<EdgeCost>>;  // by view
+
+Departures departures_at(ceres::Problem& problem, const FittedNumbers& fitted, const Costs& costs,
+                         const CameraUnknowns& c, const std::vector<ViewUnknowns>& views, double height_px) {
+  double board_m = 1e-6;
+  for (const auto& view : costs)
+    for (const EdgeCost& cost : view) board_m = std::max(board_m, cost.point.point_m.norm());
+  LinearFit fit = linear_fit(problem, fitted);
+  fit.unmodelled_sigmas = unmodelled_sigmas, fit.most_seen = 12;
+  Eigen::MatrixXd slopes =
+      Eigen::MatrixXd::Zero(fit.residuals.size(), board_faults + view_faults * static_cast<Eigen::Index>(views.size()));
+  Eigen::Index row = 0;
+  for (std::size_t i = 0; i < costs.size(); ++i)
+    for (const EdgeCost& cost : costs[i]) {
+      const double residual = cost.residual(c, views[i]) / loss_scale_sigmas;
+      const Eigen::RowVectorXd by =
+          slopes_of(cost, c, views[i], board_m, height_px) / std::sqrt(1 + residual * residual);
+      slopes.row(row).head<board_faults>() = by.head(board_faults);
+      slopes.row(row++).segment<view_faults>(board_faults + view_faults * static_cast<Eigen::Index>(i)) =
+          by.tail(view_faults);
+    }
+  return departures_of(fit, slopes);
+}
+
 struct Sigmas {
   CameraSigmas camera;
   double aspect = 0;
 };
 
-std::optional<Sigmas> sigmas_of(ceres::Problem& problem, const CameraUnknowns& c, double scale) {
+std::optional<Sigmas> sigmas_of(ceres::Problem& problem, const CameraUnknowns& c, double scale,
+                                const FittedNumbers& fitted, const Eigen::MatrixXd& by_faults) {
   ceres::Covariance::Options options;
   options.algorithm_type = ceres::SPARSE_QR;
   ceres::Covariance covariance(options);
@@ -128,7 +203,11 @@ std::optional<Sigmas> sigmas_of(ceres::Problem& problem, const CameraUnknowns& c
   bool finite = true;
   const auto read = [&](const double* one, const double* other, Eigen::Index size) {
     Eigen::MatrixXd block(size, size);
-    finite = finite && covariance.GetCovarianceBlock(one, other, block.data()) && block.allFinite();
+    finite = finite && covariance.GetCovarianceBlock(one, other, block.data());
+    block *= scale * scale;
+    const auto row = fitted.column(one), column = fitted.column(other);
+    if (row && column) block += by_faults.block(*row, *column, size, size);
+    finite = finite && block.allFinite();
     return block;
   };
   const double focal = read(&c.focal_px, &c.focal_px, 1)(0), focal_aspect = read(&c.focal_px, &c.aspect, 1)(0),
@@ -137,7 +216,7 @@ std::optional<Sigmas> sigmas_of(ceres::Problem& problem, const CameraUnknowns& c
   const Eigen::MatrixXd distortion = read(c.distortion.data(), c.distortion.data(), 4);
   const Eigen::MatrixXd magnifications = read(c.magnifications.data(), c.magnifications.data(), 2);
   if (!finite) return std::nullopt;
-  const auto sigma = [&](double variance) { return scale * std::sqrt(std::max(0.0, variance)); };
+  const auto sigma = [&](double variance) { return std::sqrt(std::max(0.0, variance)); };
   Sigmas result;
   CameraSigmas& sigmas = result.camera;
   sigmas.fx_px = sigma(focal);
@@ -204,7 +283,20 @@ std::optional<CameraAdjustment> adjust_camera(const Camera& start, const std::ve
     for (std::size_t c = 0; c < channels; ++c)
       result.bright_wider_px[c] += view_unknowns[i].wider_px[c] / static_cast<double>(views.size());
   }
-  const auto sigmas = sigmas_of(problem, camera, std::max(1.0, robust_scale(std::move(in_sigmas))));
+  FittedNumbers fitted(problem);
+  for (double* block : {&camera.focal_px, &camera.aspect, camera.centre_px.data(), camera.distortion.data(), &camera.k3,
+                        camera.magnifications.data(), camera.shifts_px.data()})
+    fitted.add(block);
+  for (ViewUnknowns& view : view_unknowns) fitted.add(view.pose.data()), fitted.add(view.wider_px.data());
+  result.noise = robust_scale(std::move(in_sigmas));
+  const Departures departures = departures_at(problem, fitted, costs, camera, view_unknowns, start.height_px);
+  const auto possible = possible_faults(views.size());
+  for (const Fault& fault : departures.seen) {
+    result.faults.push_back(possible[fault.which]);
+    result.faults.back().size = fault.size;
+  }
+  const auto sigmas =
+      sigmas_of(problem, camera, std::max(1.0, result.noise), fitted, departures.by_seen + departures.by_instead);
   if (!sigmas) return std::nullopt;
   result.sigmas = sigmas->camera, result.sigma_aspect = sigmas->aspect;
   return result;

@@ -26,6 +26,13 @@ struct CameraFreedom {
   bool k3 = true, aspect = true;
 };
 
+/// A fault that the model of one camera and one flat board leaves out.
+struct CameraFault {
+  enum class Kind { zoom, centre, rolling_shutter, bent_board, stretched_board } kind;
+  std::size_t view = 0;  ///< of the first three, which may be there in one view
+  double size = 0;       ///< relative, px, px over the image's height, m at the board's edge, relative
+};
+
 struct CameraAdjustment {
   Camera camera;
   CameraSigmas sigmas;
@@ -33,6 +40,8 @@ struct CameraAdjustment {
   std::vector<Rigid3> camera_from_board;          ///< as many as views
   std::vector<std::vector<double>> residuals_px;  ///< of each point: found minus expected, along `normal`
   std::array<double, 3> bright_wider_px{};        ///< by channel: how far edges lie towards dark squares, mean of views
+  double noise = 1;                               ///< how many times the points' own sigmas the residuals are; robust
+  std::vector<CameraFault> faults;                ///< that show, the clearest first: the sigmas count them
 };
 
 /// Fits a camera and the poses of a board in all views to the points of its edges (Ceres, Cauchy loss). Bright squares

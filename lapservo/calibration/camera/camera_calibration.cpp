@@ -22,6 +22,8 @@ constexpr std::size_t least_views = 4, least_corners = 12;
 constexpr double least_tilt_rad = rad_from_deg(15);
 // Worse than these, one sigma, and the views are too alike.
 constexpr double max_focal_sigma = 0.003, max_centre_sigma_px = 5;
+// A lens of this kind leaves less than this.
+constexpr double max_rms_px = 0.2;
 // Pixels are square, unless the views say otherwise by more than this.
 constexpr double square_pixels = 5e-4, significant_sigmas = 3;
 
@@ -182,13 +184,59 @@ Camera rounded_by_sigmas(Camera camera, const CameraSigmas& sigmas) {
   return camera;
 }
 
+// Describes the faults of one kind, and the remedy; `where`: in which views.
+std::string text_of(CameraFault::Kind kind, double size, const std::string& where) {
+  switch (kind) {
+    case CameraFault::Kind::zoom:
+      return fmt::format(
+          "the focal length of {} is {:+.2g} % off the others': images of another camera, zoom or focus; calibrate "
+          "each "
+          "of them by itself",
+          where, 100 * size);
+    case CameraFault::Kind::centre:
+      return fmt::format(
+          "the principal point of {} is {:.2g} px off the others': images that are turned, mirrored, cropped or of "
+          "another camera; give all as the sensor has them",
+          where, std::abs(size));
+    case CameraFault::Kind::rolling_shutter:
+      return fmt::format(
+          "{} is sheared by {:.2g} px from top to bottom: the board or the camera moved, and the shutter rolls; hold "
+          "both still",
+          where, std::abs(size));
+    case CameraFault::Kind::bent_board:
+      return fmt::format("the board is bent by {:.2g} mm: mount it on a flat plate", 1e3 * std::abs(size));
+    case CameraFault::Kind::stretched_board:
+      return fmt::format("the board's squares are {:+.2g} % wider than high: print it without scaling, and flat",
+                         100 * size);
+  }
+  return {};
+}
+
+// A sentence for each kind, the clearest first.
+std::vector<std::string> texts_of(const std::vector<CameraFault>& faults, const std::vector<BoardView>& views) {
+  std::vector<CameraFault::Kind> kinds;
+  std::vector<std::string> texts;
+  for (const CameraFault& fault : faults) {
+    if (std::find(kinds.begin(), kinds.end(), fault.kind) != kinds.end()) continue;
+    kinds.push_back(fault.kind);
+    std::vector<std::string> where;
+    for (const CameraFault& other : faults)
+      if (other.kind == fault.kind) where.push_back(views[other.view].name);
+    std::sort(where.begin(), where.end());
+    where.erase(std::unique(where.begin(), where.end()), where.end());
+    texts.push_back(text_of(fault.kind, fault.size, fmt::format("{}", fmt::join(where, ", "))));
+  }
+  return texts;
+}
+
 // Empty where the views suffice.
-std::string too_alike(const CameraAdjustment& adjustment) {
+std::string refusal_of(const CameraAdjustment& adjustment, const std::vector<BoardView>& views) {
   const Camera& camera = adjustment.camera;
   const CameraSigmas& sigmas = adjustment.sigmas;
   if (sigmas.fx_px < max_focal_sigma * camera.fx_px && sigmas.cx_px < max_centre_sigma_px &&
       sigmas.cy_px < max_centre_sigma_px)
     return {};
+  if (!adjustment.faults.empty()) return "the views do not agree: " + texts_of(adjustment.faults, views).front();
   return fmt::format(
       "the views are too alike: one sigma of the focal length is {:.1f} px of {:.0f}, of the principal "
       "point {:.1f} and {:.1f} px",
@@ -305,7 +353,7 @@ CameraCalibration calibrate_camera(const Board& board, const std::vector<BoardVi
     if (!adjustment) return refuse("the views are too alike to determine the camera");
     fit = fit_of(*adjustment);
   }
-  if (const std::string why = too_alike(*adjustment); !why.empty()) return refuse(why);
+  if (const std::string why = refusal_of(*adjustment, views); !why.empty()) return refuse(why);
   // Means are of light as the last round had it.
   constexpr int response_rounds = 2;
   for (int round = 0; round < response_rounds; ++round) {
@@ -326,7 +374,13 @@ CameraCalibration calibrate_camera(const Board& board, const std::vector<BoardVi
   calibration.bright_wider_px = adjustment->bright_wider_px[green];
   calibration.poses = adjustment->camera_from_board;
   add_residuals(*adjustment, edges, calibration);
-  if (const std::string why = too_alike(*adjustment); !why.empty()) return refuse(why);
+  calibration.noise = adjustment->noise, calibration.faults = texts_of(adjustment->faults, views);
+  if (const std::string why = refusal_of(*adjustment, views); !why.empty()) return refuse(why);
+  if (calibration.rms_px > max_rms_px)
+    return refuse(fmt::format("edges miss the fit by {:.2f} px rms: {}", calibration.rms_px,
+                              calibration.faults.empty()
+                                  ? "is the board flat, are the images unprocessed and sharp, is it a fisheye"
+                                  : calibration.faults.front()));
   if (!is_invertible(calibration.camera))
     return refuse("the distortion that fits the views can't be inverted at the image's border: show the board there");
   return calibration;

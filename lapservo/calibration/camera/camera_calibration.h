@@ -57,7 +57,9 @@ struct CameraCalibration {
   std::optional<ResponseFit> response;  ///< nullopt where the images do not determine it: the camera's response stays
   std::vector<double> view_rms_px;      ///< of edges about the fit, by view, green
   double rms_px = 0;
-  std::vector<Rigid3> poses;   ///< camera_from_board, by view
+  double noise = 1;                 ///< how many times the edges' own noise that is, of all colours; robust
+  std::vector<std::string> faults;  ///< that show beyond the noise, one sentence each: the sigmas count them
+  std::vector<Rigid3> poses;        ///< camera_from_board, by view
   double bright_wider_px = 0;  ///< with the calibrated response, green: 0 for a board whose squares are equally wide
 };
 

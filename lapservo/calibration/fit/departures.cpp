@@ -12,8 +12,7 @@ namespace lapservo::internal {
 namespace {
 
 constexpr double seen_sigmas = 3;
-constexpr std::size_t most_seen = 4;
-// Of the squares of a fault's slopes, what x has to leave for it to be distinguished.
+// The part of the squares of a fault's slopes that x has to leave, for it to be distinguished.
 constexpr double least_left = 1e-9;
 
 // Standard deviation of a sum over groups that stay alike over some neighbouring ones (Newey and West 1987).
@@ -36,6 +35,7 @@ Estimate estimate(const LinearFit& fit, const Eigen::VectorXd& residuals, const 
   const double squares = left.squaredNorm();
   if (!(squares > least_left * slopes_squared)) return {};
   const double size = -left.dot(residuals) / squares;
+  if (fit.noise > 0) return {size, fit.unmodelled_sigmas * fit.noise / std::sqrt(squares)};
   Eigen::VectorXd gradients(static_cast<Eigen::Index>(fit.groups.size()) - 1);
   for (Eigen::Index g = 0; g < gradients.size(); ++g) {
     const Eigen::Index first = fit.groups[static_cast<std::size_t>(g)],
@@ -46,7 +46,7 @@ Estimate estimate(const LinearFit& fit, const Eigen::VectorXd& residuals, const 
   return {size, std::max(1e-300, fit.unmodelled_sigmas * sigma_of_sum(gradients, fit.alike_groups) / squares)};
 }
 
-// What x leaves of the slopes of faults, and what x is off by for a size of 1 of each.
+// The part of the slopes of faults that x leaves, and the displacement of x by a size of 1 of each.
 struct BesideX {
   Eigen::MatrixXd left, displacements;
 
@@ -87,7 +87,7 @@ Departures departures_of(const LinearFit& fit, const Eigen::MatrixXd& slopes) {
   std::vector<Estimate> estimates = alone;
   std::vector<bool> is_seen(count);
   Departures result;
-  while (result.seen.size() < most_seen) {
+  while (result.seen.size() < fit.most_seen) {
     std::optional<std::size_t> clearest;
     for (std::size_t k = 0; k < count; ++k)
       if (!is_seen[k] && estimates[k].sigmas() > (clearest ? estimates[*clearest].sigmas() : seen_sigmas)) clearest = k;

@@ -14,7 +14,9 @@ struct LinearFit {
   Eigen::VectorXd residuals;
   std::vector<Eigen::Index> groups;  ///< the first row of each group of residuals, as those of a frame; last, their end
   std::size_t alike_groups = 1;      ///< over so many neighbouring groups noise stays alike
+  double noise = 0;                  ///< sigma of residuals that are independent; 0: by the scatter of the groups
   double unmodelled_sigmas = 1;      ///< how many times as far off as the residuals' scatter makes it a number may be
+  std::size_t most_seen = 4;
 };
 
 /// A number that the model takes for 0, as the residuals have it.

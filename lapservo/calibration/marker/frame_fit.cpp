@@ -185,7 +185,9 @@ Departures departures_at(const Linearisation& at, const Eigen::VectorXd& x, cons
   const Eigen::Index channels = at.residuals.rows(), frames = at.residuals.cols(), numbers = x.size(),
                      rows = channels * frames;
   const double scale = loss_scale(channels);
-  LinearFit fit{{}, Eigen::VectorXd::Zero(rows + numbers), {}, alike_frames, unmodelled_sigmas};
+  LinearFit fit;
+  fit.residuals = Eigen::VectorXd::Zero(rows + numbers);
+  fit.alike_groups = alike_frames, fit.unmodelled_sigmas = unmodelled_sigmas;
   Eigen::MatrixXd jacobian(rows + numbers, numbers), weighed(channels, frames);
   for (Eigen::Index i = 0; i < frames; ++i) {
     const Eigen::VectorXd residual = weights.cwiseProduct(at.residuals.col(i));

@@ -29,6 +29,8 @@ constexpr double widest_unseen_rad = 0.9;  // between neighbouring facing azimut
 constexpr double max_blur_diameters = 0.02;
 constexpr int max_rounds = 16, gap_round = 7;
 constexpr double settled_m = 1e-6;
+// Largest tolerance of a print that may be written: with more, psi is hardly ever known.
+constexpr double max_tolerance_m = 0.1e-3;
 // A gap narrower than this, or than three sigma, is none.
 constexpr double min_gap_m = 0.04e-3, min_gap_sigmas = 3;
 
@@ -96,7 +98,7 @@ class TurnFit {
                                         {extra_px, how.seam_reach_m, free_gap_, how.ask_processing, only_video_});
       if (measured.edges.all.size() < min_edges) return true;  // too few for a pose
       if (with_covariance && !tells_pose(measured.edges)) return true;
-      measured.turned_rad = frame.turned_rad;
+      measured.turned_rad = frame.turned_rad, measured.time_s = frame.time_s;
       measured_.push_back(std::move(measured));
       return false;
     });
@@ -242,6 +244,25 @@ bool is_settled(const Adjustment& adjustment, double radius_m) {
   return true;
 }
 
+// A sentence for each kind, the clearest first.
+std::vector<std::string> texts_of(const std::vector<PrintFault>& faults) {
+  std::vector<std::string> texts;
+  std::optional<PrintFault::Kind> told;
+  for (const PrintFault& fault : faults) {
+    if (told == fault.kind) continue;
+    told = fault.kind;
+    char text[200];
+    std::snprintf(text, sizeof text,
+                  fault.kind == PrintFault::Kind::slips
+                      ? "the print slips by %.3f mm about %.0f s after the start: fasten it and "
+                        "record again"
+                      : "a boundary of the print bows by %.3f mm between its ends: print and cut it straight",
+                  1e3 * std::abs(fault.size_m), fault.from_s);
+    texts.emplace_back(text);
+  }
+  return texts;
+}
+
 struct ResidualSummary {
   double rms_px = 0;
   std::vector<PrintResidual> residuals;
@@ -358,10 +379,18 @@ MarkerCalibration calibrate_marker(const Rig& rig, std::size_t instrument, std::
         "without glare");
   if (!settled) return refused("the fit does not settle: more frames, sharper ones, or a rig nearer to the print");
   calibration.after_px = summary_of(*last, fit.measured(), fit.marker(), 2).rms_px;
+  calibration.faults = texts_of(last->faults);
   calibration.marker = fit.marker();
   calibration.marker.sigmas = sigmas_of(*last->covariance, nominal.sigmas);
   if (no_gap_sigma_rad) calibration.marker.sigmas.gap_rad = no_gap_sigma_rad;
   calibration.marker.tolerance_m = tolerance_of(PrintShape::of(fit.marker()), *last->covariance, fit.marker());
+  if (calibration.marker.tolerance_m > max_tolerance_m) {
+    char text[80];
+    std::snprintf(text, sizeof text,
+                  "its boundaries would be known to %.2f mm only: ", 1e3 * calibration.marker.tolerance_m);
+    return refused(
+        text + (calibration.faults.empty() ? "turn it more slowly, nearer and sharper" : calibration.faults.front()));
+  }
   if (const auto problem = marker_problem(calibration.marker))
     return refused("what was found is no marker: " + problem->text());
   if (const std::string problem = decoding_problem(calibration.marker); !problem.empty())

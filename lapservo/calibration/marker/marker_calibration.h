@@ -61,6 +61,7 @@ struct MarkerCalibration {
   /// Residuals of the boundaries' points about a fit of the poses, for the rig's print and for the calibrated one: rms
   /// of the points that are inliers of the latter.
   double before_px = 0, after_px = 0;
+  std::vector<std::string> faults;    ///< of the print, that show beyond the noise: the sigmas count them
   std::vector<PrintResidual> before;  ///< for the rig's print
   std::vector<KeyFrame> key_frames;   ///< those used, where the calibrated marker has them
 };

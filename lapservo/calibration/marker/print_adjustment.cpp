@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <utility>
 
+#include "lapservo/calibration/fit/linear_fit.h"
 #include "lapservo/calibration/fit/robust_scale.h"
 #include "lapservo/calibration/fit/solve_quietly.h"
 #include "lapservo/core/dense_matrix.h"
@@ -16,6 +17,9 @@ namespace lapservo::internal {
 namespace {
 
 constexpr double mm = 1e-3;
+// Beyond the scatter of frames; those that see the marker from nearly one side err alike.
+constexpr double unmodelled_sigmas = 1.3;
+constexpr std::size_t alike_frames = 6;  // frames lie in the order of the sides that face the camera
 constexpr int pose_numbers = 6;
 constexpr std::size_t upper_group = measurement_groups, groups = measurement_groups + 2;
 
@@ -158,6 +162,7 @@ std::vector<Term> terms_of(const SeamEdge& edge, bool lower, double turned_rad, 
 struct EdgeCost {
   const LinearCost* cost;
   std::size_t group;
+  Eigen::Index row;  // of the problem's residuals
 };
 
 double common_sigma_px(std::size_t group, const ViewMeasurements& frame) {
@@ -180,8 +185,10 @@ std::vector<EdgeCost> add_frame(ceres::Problem& problem, const ViewMeasurements&
   };
   add_prior(problem, &frame.film_sigmas, (film_mean_m - measured.film_m) / film_sigma_m, 1);
   std::vector<EdgeCost> edges;
-  for (const Measurement& m : measured.edges.all)
-    edges.push_back({add(m, m.group, terms_of(m, shape, covered_rad, frame, shared)), m.group});
+  for (const Measurement& m : measured.edges.all) {
+    const Eigen::Index row = problem.NumResiduals();
+    edges.push_back({add(m, m.group, terms_of(m, shape, covered_rad, frame, shared)), m.group, row});
+  }
   const auto add_seam = [&](const std::optional<SeamEdge>& edge, bool lower) {
     if (edge) add(*edge, upper_group + (lower ? 1 : 0), terms_of(*edge, lower, measured.turned_rad, frame, shared));
   };
@@ -247,9 +254,84 @@ std::vector<TakenForZero> common_errors(SharedUnknowns& shared, const std::vecto
   return errors;
 }
 
+constexpr int change_parts = 4;  // of the time, between which a print may change
+constexpr std::size_t boundaries = 4;
+
+// Each fault that there may be, of size 0: for either edge, from a part of the time on; for each boundary, curved.
+std::vector<PrintFault> possible_faults(double first_s, double last_s) {
+  std::vector<PrintFault> faults;
+  for (int part = 1; part < change_parts; ++part)
+    faults.insert(faults.end(), 2, {PrintFault::Kind::slips, first_s + (last_s - first_s) * part / change_parts});
+  faults.insert(faults.end(), boundaries, {PrintFault::Kind::curved});
+  return faults;
+}
+
+// Slopes of a residual by these, in m.
+Eigen::RowVectorXd slopes_of(const Measurement& m, double time_s, const std::vector<PrintFault>& faults) {
+  const double along = m.along_px_per_m / m.sigma_px, lower = m.turn_fraction;
+  Eigen::RowVectorXd slopes = Eigen::RowVectorXd::Zero(static_cast<Eigen::Index>(faults.size()));
+  const std::size_t slips = faults.size() - boundaries;
+  for (std::size_t i = 0; i < slips; ++i)
+    if (time_s > faults[i].from_s) slopes[static_cast<Eigen::Index>(i)] = (i % 2 == 0 ? 1 - lower : lower) * along;
+  slopes[static_cast<Eigen::Index>(slips + m.group)] = 4 * lower * (1 - lower) * along;
+  return slopes;
+}
+
+struct PrintDepartures {
+  std::vector<PrintFault> faults;
+  PrintCovariance covariance = PrintCovariance::Zero();
+};
+
+PrintDepartures departures_at(ceres::Problem& problem, const std::vector<ViewMeasurements>& frames,
+                              const std::vector<std::vector<EdgeCost>>& edges, double loss_scale_sigmas,
+                              SharedUnknowns& shared, std::vector<FrameUnknowns>& unknowns) {
+  FittedNumbers numbers(problem);
+  std::vector<double*> print;
+  for (double* length_mm : shared.lengths_mm()) print.push_back(length_mm);
+  print.push_back(&shared.gap_rad);
+  for (double* number : print) numbers.add(number);
+  for (const TakenForZero& taken : shared.taken_for_zero()) numbers.add(taken.unknown);
+  numbers.add(&shared.seam_lag_px);
+  for (FrameUnknowns& frame : unknowns) {
+    numbers.add(frame.pose.data()), numbers.add(&frame.film_sigmas);
+    for (double& common_px : frame.common_px) numbers.add(&common_px);
+  }
+  LinearFit fit = linear_fit(problem, numbers);
+  fit.noise = 0, fit.unmodelled_sigmas = unmodelled_sigmas, fit.alike_groups = alike_frames;
+  for (const auto& of_frame : edges) fit.groups.push_back(of_frame.front().row);
+  fit.groups.push_back(edges.back().back().row + 1);
+  const auto [first, last] = std::minmax_element(frames.begin(), frames.end(),
+                                                 [](const auto& a, const auto& b) { return a.time_s < b.time_s; });
+  const auto possible = possible_faults(first->time_s, last->time_s);
+  Eigen::MatrixXd slopes = Eigen::MatrixXd::Zero(fit.residuals.size(), static_cast<Eigen::Index>(possible.size()));
+  for (std::size_t i = 0; i < frames.size(); ++i)
+    for (std::size_t k = 0; k < edges[i].size(); ++k) {
+      if (edges[i][k].group >= boundaries) continue;
+      const double in_scales = edges[i][k].cost->left() / loss_scale_sigmas;
+      slopes.row(edges[i][k].row) =
+          slopes_of(frames[i].edges.all[k], frames[i].time_s, possible) / std::sqrt(1 + in_scales * in_scales);
+    }
+  const Departures departures = departures_of(fit, slopes);
+  PrintDepartures result;
+  for (const Fault& fault : departures.seen) {
+    result.faults.push_back(possible[fault.which]);
+    result.faults.back().size_m = fault.size;
+  }
+  if (departures.seen.empty()) return result;
+  const Eigen::MatrixXd covariance = departures.by_seen + departures.by_instead;
+  for (Eigen::Index i = 0; i < print_numbers; ++i)
+    for (Eigen::Index j = 0; j < print_numbers; ++j) {
+      const auto row = numbers.column(print[static_cast<std::size_t>(i)]),
+                 column = numbers.column(print[static_cast<std::size_t>(j)]);
+      if (row && column) result.covariance(i, j) = covariance(*row, *column);
+    }
+  return result;
+}
+
 // The print's; the common errors count as they were before the fit.
 std::optional<PrintCovariance> covariance_of(ceres::Problem& problem, SharedUnknowns& shared,
-                                             const std::vector<TakenForZero>& errors, double noise_scale) {
+                                             const std::vector<TakenForZero>& errors, double noise_scale,
+                                             const PrintCovariance& by_faults) {
   const auto lengths_mm = shared.lengths_mm();
   std::vector<const double*> unknowns(lengths_mm.begin(), lengths_mm.end());
   unknowns.push_back(&shared.gap_rad);
@@ -271,7 +353,7 @@ std::optional<PrintCovariance> covariance_of(ceres::Problem& problem, SharedUnkn
   const Eigen::MatrixXd by_common = solve_symmetric(of_common, cross.transpose()).transpose();
   const PrintCovariance known = joint - by_common * cross.transpose();  // were the common errors known
   const PrintCovariance print = std::max(1.0, noise_scale * noise_scale) * known +
-                                by_common * prior.cwiseAbs2().asDiagonal() * by_common.transpose();
+                                by_common * prior.cwiseAbs2().asDiagonal() * by_common.transpose() + by_faults;
   PrintNumbers units = PrintNumbers::Constant(mm);
   units[print_numbers - 1] = problem.IsParameterBlockConstant(&shared.gap_rad) ? 0 : 1;
   const PrintCovariance scaled = units.asDiagonal() * print * units.asDiagonal();
@@ -314,15 +396,18 @@ std::optional<Adjustment> adjust(const std::vector<ViewMeasurements>& frames, co
     UnknownVector& step = result.steps.emplace_back(pose_numbers + 1);
     step << Eigen::Map<const Eigen::Matrix<double, pose_numbers, 1>>(unknowns[i].pose.data()), unknowns[i].film_sigmas;
     auto& residuals_px = result.residuals_px.emplace_back();
-    for (const auto& [cost, group] : edges[i]) {
+    for (const auto& [cost, group, row] : edges[i]) {
       residuals_px.push_back(cost->left() * cost->sigma());
       if (group < 4) sigmas.push_back(cost->left());
     }
   }
   result.noise_scale = robust_scale(std::move(sigmas));
   if (options.with_covariance) {
-    result.covariance =
-        covariance_of(problem, shared, common_errors(shared, frames, edges_px, free_lag), result.noise_scale);
+    const PrintDepartures departures =
+        departures_at(problem, frames, edges, options.loss_scale_sigmas, shared, unknowns);
+    result.faults = departures.faults;
+    result.covariance = covariance_of(problem, shared, common_errors(shared, frames, edges_px, free_lag),
+                                      result.noise_scale, departures.covariance);
     if (!result.covariance) return std::nullopt;
   }
   return result;

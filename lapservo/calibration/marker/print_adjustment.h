@@ -9,6 +9,13 @@
 
 namespace lapservo::internal {
 
+/// A fault that the model of one print with straight edges leaves out.
+struct PrintFault {
+  enum class Kind { slips, curved } kind;
+  double from_s = 0;  ///< of the first: from when on one edge lies elsewhere along the shaft
+  double size_m = 0;  ///< by how much; of the second, how far an edge's middle lies beyond the line of its ends
+};
+
 struct AdjustmentOptions {
   double loss_scale_sigmas = 2.5;  ///< of the Cauchy loss
   bool free_print = true;          ///< else poses alone
@@ -25,7 +32,8 @@ struct Adjustment {
   std::vector<std::vector<double>> residuals_px;
   /// How many times what the measurements say of themselves their scatter is; robust.
   double noise_scale = 1;
-  std::optional<PrintCovariance> covariance;  ///< of the print, when requested
+  std::optional<PrintCovariance> covariance;  ///< of the print, when requested; counts the faults
+  std::vector<PrintFault> faults;             ///< that show, the clearest first, with the covariance
   /// The images look compressed and rotate in one direction: the seam may lag by an unknown amount.
   bool lags = false;
 };

@@ -90,7 +90,7 @@ class Explainer {
   std::optional<Explanation> best_;
 };
 
-// Of those with a size, the ones that a fit without them sees; all where there is no such fit.
+// Faults to try: of those with a size, the ones that a fit without them sees; all where there is no such fit.
 std::vector<JointFault> possible_faults(const Joints& joints, const std::vector<TimedPose>& poses, const ArmFit* fit) {
   std::vector<JointFault> faults = other_joint_faults(joints);
   const auto sized = sized_joint_faults(joints, poses);
@@ -124,8 +124,10 @@ std::optional<ArmFit> fit_arm(const Instrument& instrument, const ArmStart& star
   const Departures &with_seen = fit.departures, &without = result.fit.departures;
   result.covariance = (arm_covariance(fit) + with_seen.by_seen).topLeftCorner(numbers, numbers) +
                       bias * bias.transpose() + without.by_instead;
-  for (std::size_t k = free.joints.size(); k < with.joints.size(); ++k)
-    result.faults.push_back(with.joints[k].text(model.blocks().joints.of(fit.x)[static_cast<Eigen::Index>(k)]));
+  for (std::size_t k = free.joints.size(); k < with.joints.size(); ++k) {
+    const double size = model.blocks().joints.of(fit.x)[static_cast<Eigen::Index>(k)];
+    if (std::abs(size) > with.joints[k].least) result.faults.push_back(with.joints[k].text(size));
+  }
   return result;
 }
 

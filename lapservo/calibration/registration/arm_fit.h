@@ -15,7 +15,7 @@ namespace lapservo::internal {
 struct ArmFit {
   ArmModel model;
   FrameFit fit;
-  /// Of fit.x. With what it is off by for faults of the readings that show, and for what they usually are.
+  /// Covariance of fit.x, with the square of its displacement by faults of the readings that show.
   Eigen::MatrixXd covariance;
   Eigen::VectorXd noise;            ///< how many times the poses' own sigmas the residuals are, by channel
   std::vector<std::string> faults;  ///< of the readings, that show, in words; the clearest first

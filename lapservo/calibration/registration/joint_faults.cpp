@@ -64,7 +64,7 @@ JointFault lag_fault(const std::string& name, std::size_t j) {
           1e-3};
 }
 
-// Of usual rates of cameras and of folders.
+// Sizes for the usual rates of cameras and of folders.
 std::vector<double> clock_starts(double images_per_s) {
   std::vector<double> starts{0};
   for (const double rate : {5.0, 6.0, 7.5, 8.0, 10.0, 12.5, 15.0, 20.0, 24.0, 25.0, 30.0, 50.0, 60.0})
@@ -82,10 +82,11 @@ JointFault clock_fault(double period_s) {
           [](JointRecording& r, double size) {
             for (double& time_s : r.time_s) time_s *= 1 + size;
           },
-          1e-4, clock_starts(1 / period_s)};
+          1e-4, 0, clock_starts(1 / period_s)};
 }
 
 JointFault lost_frames_fault(double from_s) {
+  constexpr double least_lost_s = 8e-3;  // half a frame of the fastest cameras
   return {[=](double size) {
             return fmt::format(
                 "from about {:.1f} s on, images are stamped {:.0f} ms {}: frames are {} there; record again without "
@@ -99,7 +100,7 @@ JointFault lost_frames_fault(double from_s) {
               last_s = time_s;
             }
           },
-          1e-3};
+          1e-3, least_lost_s};
 }
 
 void unwrap(JointRecording& r) {

@@ -12,11 +12,12 @@ namespace lapservo::internal {
 
 /// One way in which a recording's readings are not those of the arm that the images show.
 struct JointFault {
-  /// What it is and what helps, for readings that have it with this size.
+  /// Describes readings that have it with this size, and the remedy.
   std::function<std::string(double size)> text;
   /// Mends readings that have it with this size.
   std::function<void(JointRecording&, double size)> mend;
   double step = 0;                   ///< for derivatives by the size; 0: it is there or not, and has no size
+  double least = 0;                  ///< smaller ones are not worth a word
   std::vector<double> starts = {0};  ///< from where a fit of its size may have to begin
 };
 

@@ -63,6 +63,7 @@ struct ViewMeasurements {
   std::optional<SeamEdges> seam;
   double blur_px = 1.2, film_m = film_mean_m;  ///< that they were measured with
   double turned_rad = 0;                       ///< about the axis since the frame before; the caller's to say
+  double time_s = 0;                           ///< of the frame; the caller's to say
   ProcessingEvidence processing;               ///< unknown when not asked
   std::array<double, 4> bias_px{};             ///< taken off the boundaries; sides are measured in grey values then
 };

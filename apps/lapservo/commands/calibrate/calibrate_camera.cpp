@@ -69,12 +69,15 @@ int refuse(const CalibrateCameraOptions& options, const std::string& why) {
 
 void print_result(const std::vector<BoardView>& views, const CameraCalibration& calibration) {
   const Camera& camera = calibration.camera;
-  std::printf("%zu views; edges miss the fit by %.3f px rms\n", views.size(), calibration.rms_px);
+  std::printf("%zu views; edges miss the fit by %.3f px rms, %.1f times their noise\n", views.size(),
+              calibration.rms_px, calibration.noise);
   for (std::size_t i = 0; i < views.size(); ++i)
     std::printf("  %-40s %4zu corners   %.3f px\n", views[i].name.c_str(), views[i].corners.size(),
                 calibration.view_rms_px[i]);
   for (const CalibratedNumber& n : calibrated_numbers(Camera{}, calibration))
     std::printf("  %-24s %12.6f   sigma %.6f\n", n.name.c_str(), n.after, n.sigma);
+  for (const std::string& fault : calibration.faults)
+    std::printf("beyond the noise, counted in the sigmas: %s\n", fault.c_str());
   if (!calibration.response) {
     std::printf("response: unchanged, these images don't determine it\n");
     return;

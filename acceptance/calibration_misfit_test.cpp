@@ -1,0 +1,457 @@
+// Recordings like those of `lapservo sample`, of other cameras, arms and prints, with more noise, as PNG and as H.264,
+// as they are and with something in them that a calibration's model leaves out. A calibration refuses them with the
+// cause, or its sigmas hold. LAPSERVO_MISFIT_RECORDINGS and LAPSERVO_MISFIT_SEED set the number of recordings (1) and
+// the first seed; LAPSERVO_MISFIT_CLEAN leaves all but the clean ones out. Each test prints its table.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <functional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <opencv2/imgproc.hpp>
+
+#include "lapservo/calibration/camera/camera_calibration.h"
+#include "lapservo/calibration/marker/marker_calibration.h"
+#include "lapservo/calibration/registration/registration.h"
+#include "lapservo/core/angles.h"
+#include "lapservo/core/random.h"
+#include "lapservo/geometry/rotation.h"
+#include "lapservo/io/frame_source.h"
+#include "lapservo/io/video/video_writer.h"
+#include "lapservo/rig/joint_conversion.h"
+#include "lapservo/sim/boards.h"
+#include "lapservo/sim/instrument_shaft.h"
+#include "lapservo/sim/renderer.h"
+#include "lapservo/sim/tissue.h"
+#include "lapservo/testing/environment.h"
+#include "lapservo/testing/rigs.h"
+#include "lapservo/testing/temporary_folder.h"
+#include "lapservo/vision/tracker.h"
+
+namespace lapservo::acceptance {
+using namespace internal;
+namespace {
+
+using testing::from_environment;
+
+constexpr double wrong_sigmas = 4;
+
+// What a calibration says: a refusal, or errors in its own sigmas and the faults that it names.
+struct Answer {
+  std::string refusal;
+  std::vector<double> errors;
+  std::vector<std::string> faults{};
+
+  double worst() const {
+    double most = 0;
+    for (const double z : errors) most = std::max(most, std::abs(z));
+    return most;
+  }
+  bool is_wrong() const { return refusal.empty() && worst() > wrong_sigmas; }
+};
+
+// Answers to many recordings.
+class Answers {
+ public:
+  // `cause`: a word of the right one; empty for a clean recording, and where two faults are in one.
+  void add(const std::string& what, const std::string& cause, const Answer& answer) {
+    const std::string said = !answer.refusal.empty() ? answer.refusal : answer.faults.empty() ? "" : answer.faults[0];
+    const bool named = !cause.empty() && said.find(cause) != std::string::npos;
+    std::printf("  %-32s %s%s %s\n", what.c_str(),
+                answer.refusal.empty() ? ("error / sigma up to " + std::to_string(answer.worst()).substr(0, 4)).c_str()
+                                       : "refused",
+                answer.is_wrong() ? " WRONG" : "", said.c_str());
+    ++recordings_, refused_ += !answer.refusal.empty(), wrong_ += answer.is_wrong();
+    if (!cause.empty() && !said.empty()) ++told_, named_ += named;
+    if (!answer.refusal.empty()) return;
+    for (const double z : answer.errors) squares_ += z * z, ++numbers_;
+  }
+  void print(const std::string& name) const {
+    std::printf(
+        "%s: %d recordings, %d refused, %d accepted and off by more than %.0f sigmas; error / sigma of the "
+        "accepted %.2f; cause named rightly in %d of %d\n",
+        name.c_str(), recordings_, refused_, wrong_, wrong_sigmas, error_over_sigma(), named_, told_);
+  }
+  double error_over_sigma() const { return numbers_ > 0 ? std::sqrt(squares_ / numbers_) : 0; }
+  int refused() const { return refused_; }
+  int wrong() const { return wrong_; }
+  double named() const { return told_ > 0 ? static_cast<double>(named_) / told_ : 1; }
+
+ private:
+  int recordings_ = 0, refused_ = 0, wrong_ = 0, told_ = 0, named_ = 0;
+  double squares_ = 0, numbers_ = 0;
+};
+
+// The seeds, each with its noise and its encoding.
+struct Recording {
+  std::uint64_t seed;
+  double noise;
+  bool compressed;
+};
+
+std::vector<Recording> recordings() {
+  const int count = from_environment("LAPSERVO_MISFIT_RECORDINGS", 1),
+            first = from_environment("LAPSERVO_MISFIT_SEED", 1);
+  std::vector<Recording> all;
+  for (int seed = first; seed < first + count; ++seed)
+    all.push_back({static_cast<std::uint64_t>(seed), seed % 2 != 0 ? 1.0 : 4.0, seed % 3 == 2});
+  return all;
+}
+
+bool clean_only() {
+  return from_environment("LAPSERVO_MISFIT_CLEAN", 0) != 0;
+}
+
+struct UsualCamera {
+  int width_px, height_px;
+  double focal_px, k1;
+};
+constexpr std::array cameras{UsualCamera{960, 540, 825, 0}, UsualCamera{640, 480, 600, -0.2},
+                             UsualCamera{1280, 720, 1080, -0.1}, UsualCamera{720, 576, 690, 0.05}};
+
+const Eigen::Vector3d marker_m(-0.02, 0.01, 0.1);  // in the middle of its motion
+
+// A camera, an arm before it and its marker.
+Rig laboratory(std::uint64_t seed) {
+  Random random(seed);
+  Rig rig = testing::paper_test_rig();
+  const UsualCamera& usual = cameras[seed % cameras.size()];
+  Camera& camera = rig.camera = Camera{};
+  camera.width_px = usual.width_px, camera.height_px = usual.height_px;
+  camera.fx_px = camera.fy_px = usual.focal_px * random.uniform(0.95, 1.05);
+  camera.cx_px = usual.width_px / 2.0 + random.uniform(-8, 8);
+  camera.cy_px = usual.height_px / 2.0 + random.uniform(-8, 8);
+  camera.distortion[0] = usual.k1;
+  rig.instruments.resize(1);
+  Instrument& instrument = rig.instruments[0];
+  const Eigen::Vector3d rcm_m(random.uniform(-0.09, -0.06), random.uniform(0.05, 0.08), random.uniform(0.05, 0.07));
+  instrument.camera_from_rcm = Rigid3{rotation_between(Eigen::Vector3d::UnitX(), marker_m - rcm_m), rcm_m};
+  const auto sign = [&] { return random.uniform() < 0.5 ? -1.0 : 1.0; };
+  instrument.joints = Joints{{"yaw", "pitch", "insertion", "roll"},
+                             {1, sign(), sign(), sign()},
+                             {0, random.uniform(1.3, 1.7), random.uniform(-0.03, 0.03), random.uniform(-2, 2)}};
+  instrument.image_delay_s = random.uniform(0.05, 0.2);
+  return rig;
+}
+
+JointVector swinging(const Rig& rig, double time_s, std::uint64_t seed) {
+  const double p = 0.7 * static_cast<double>(seed);
+  const double reach_m = (marker_m - rig.instruments[0].camera_from_rcm->translation).norm();
+  return {0.22 * std::sin(0.9 * time_s + p), 1.57 + 0.18 * std::sin(1.3 * time_s + 1 + 2 * p),
+          reach_m + 0.008 * std::sin(0.7 * time_s + 3 * p), 3.3 * std::sin(0.6 * time_s + 2 + p)};
+}
+
+RenderOptions with_noise(double times) {
+  RenderOptions options;
+  options.sensor.read_noise *= times, options.sensor.shot_noise *= times * times;
+  return options;
+}
+
+// Shows images with their times, as they are or out of a video.
+void show(int count, double fps, bool compressed, const std::function<cv::Mat(int)>& image,
+          const std::function<void(const cv::Mat&, double)>& look) {
+  if (!compressed) {
+    for (int i = 0; i < count; ++i) look(image(i), i / fps);
+    return;
+  }
+  const testing::TemporaryFolder folder;
+  VideoWriter video(folder / "video.mp4", fps);
+  for (int i = 0; i < count; ++i) video.add(image(i));
+  video.commit();
+  const auto source = open_frame_source((folder / "video.mp4").string(), fps);
+  while (const auto frame = source->next()) look(frame->bgr, frame->time_s);
+}
+
+// --- registration
+
+struct Swing {
+  Rig truth;
+  std::vector<TimedPose> poses{};
+  JointRecording joints{};
+};
+
+// Encoders that count, a clock that stamps within a millisecond.
+JointRecording readings_of(const Rig& truth, double seconds, std::uint64_t seed) {
+  constexpr std::array<double, 4> counts{1e-4, 1e-4, 1e-5, 3e-4};
+  constexpr double stamp_s = 1e-3, beyond_s = 0.8;
+  Random random(seed + 77);
+  const Instrument& instrument = truth.instruments[0];
+  JointRecording joints;
+  for (double time_s = -beyond_s; time_s < seconds + beyond_s; time_s += 0.02) {
+    const Eigen::Vector4d reading = joints_from_q(*instrument.joints, swinging(truth, time_s, seed).vector());
+    auto& at = joints.joints.emplace_back();
+    for (std::size_t j = 0; j < 4; ++j)
+      at[j] = counts[j] * std::round(reading[static_cast<Eigen::Index>(j)] / counts[j]);
+    joints.time_s.push_back(time_s - *instrument.image_delay_s + random.uniform(-stamp_s, stamp_s));
+  }
+  return joints;
+}
+
+Swing swing(const Recording& recording) {
+  constexpr double seconds = 12.5;
+  Swing result{laboratory(recording.seed)};
+  const Rig& truth = result.truth;
+  const double fps = recording.compressed ? 30 : 8;
+  Renderer renderer(truth.camera, shafts_of(truth),
+                    make_tissue(truth.camera.width_px, truth.camera.height_px, recording.seed),
+                    with_noise(recording.noise));
+  Rig free = truth;
+  free.instruments[0].camera_from_rcm.reset();
+  Tracker tracker(free, {.frame_budget = std::nullopt});
+  show(
+      static_cast<int>(seconds * fps), fps, recording.compressed,
+      [&](int i) {
+        return renderer.render({placement_of(truth.instruments[0], swinging(truth, i / fps, recording.seed))},
+                               1000 * recording.seed + static_cast<std::uint64_t>(i));
+      },
+      [&](const cv::Mat& bgr, double time_s) {
+        const Observation& seen = tracker.track(bgr)[0];
+        if (seen.status == Status::ok && seen.marker) result.poses.push_back({time_s, *seen.marker});
+      });
+  result.joints = readings_of(truth, seconds, recording.seed);
+  return result;
+}
+
+Answer registration_of(const Swing& swing) {
+  const Instrument& truth = swing.truth.instruments[0];
+  Instrument named = truth;
+  named.camera_from_rcm.reset(), named.image_delay_s.reset();
+  named.joints->sign = {1, 1, 1, 1}, named.joints->offset = {};
+  const Registration found = register_arm(named, swing.poses, swing.joints, "joints");
+  if (!found.refusal.empty()) return {found.refusal, {}};
+  const Registration::Arm& arm = *found.arm;
+  const Rigid3& expected = *truth.camera_from_rcm;
+  Answer answer{"", {}, found.faults};
+  for (Eigen::Index i = 0; i < 3; ++i)
+    answer.errors.push_back((found.camera_from_rcm.translation - expected.translation)[i] /
+                            found.sigma_translation_m[i]);
+  answer.errors.push_back(expected.rotation.angularDistance(found.camera_from_rcm.rotation) / found.sigma_rotation_rad);
+  for (const std::size_t j : {1U, 2U})
+    answer.errors.push_back((arm.joints.offset[j] - truth.joints->offset[j]) / arm.sigma_offset[j]);
+  answer.errors.push_back(wrap_pi(arm.joints.offset[3] - truth.joints->offset[3]) / arm.sigma_offset[3]);
+  answer.errors.push_back((arm.image_delay_s - *truth.image_delay_s) / arm.sigma_image_delay_s);
+  return answer;
+}
+
+struct JointDeparture {
+  std::string name, cause;  // no cause: two at once
+  std::function<void(Swing&)> apply;
+};
+
+std::vector<JointDeparture> joint_departures() {
+  const auto rows = [](const std::function<void(std::array<double, 4>&)>& change) {
+    return [=](Swing& swing) {
+      for (auto& at : swing.joints.joints) change(at);
+    };
+  };
+  std::vector<JointDeparture> all;
+  for (const double p : {1.0, 0.3, 0.1, 0.03}) {
+    const auto with = [&](const std::string& text) { return text + " x " + std::to_string(p).substr(0, 4); };
+    all.push_back({with("pitch + 0.2 yaw"), "coupled", rows([=](auto& at) { at[1] += 0.2 * p * at[0]; })});
+    all.push_back({with("roll + 0.5 pitch"), "coupled", rows([=](auto& at) { at[3] += 0.5 * p * at[1]; })});
+    all.push_back({with("insertion by 1.5"), "insertion moves by", rows([=](auto& at) { at[2] *= 1 + 0.5 * p; })});
+    all.push_back({with("pitch by 1.2"), "pitch moves by", rows([=](auto& at) { at[1] *= 1 + 0.2 * p; })});
+    all.push_back({with("yaw by 0.9"), "yaw moves by", rows([=](auto& at) { at[0] *= 1 - 0.1 * p; })});
+    all.push_back({with("roll by 1.1"), "roll moves by", rows([=](auto& at) { at[3] *= 1 + 0.1 * p; })});
+    all.push_back({with("pitch late by 0.1 s"), "the readings of pitch", [=](Swing& swing) {
+                     JointRecording& r = swing.joints;
+                     const JointRecording before = r;
+                     for (std::size_t i = 0; i < r.joints.size(); ++i)
+                       if (const auto at = before.at(r.time_s[i] - 0.1 * p)) r.joints[i][1] = (*at)[1];
+                   }});
+    all.push_back({with("clock by 1.05"), "clock", [=](Swing& swing) {
+                     for (double& time_s : swing.joints.time_s) time_s *= 1 + 0.05 * p;
+                   }});
+    all.push_back({with("pitch by 1.1, roll + 0.2 yaw"), "",
+                   rows([=](auto& at) { at[1] *= 1 + 0.1 * p, at[3] += 0.2 * p * at[0]; })});
+  }
+  all.push_back({"yaw and pitch exchanged", "exchanged", rows([](auto& at) { std::swap(at[0], at[1]); })});
+  all.push_back({"yaw and roll exchanged", "exchanged", rows([](auto& at) { std::swap(at[0], at[3]); })});
+  all.push_back({"roll wraps", "wraps", rows([](auto& at) { at[3] = wrap_pi(at[3]); })});
+  all.push_back({"images of another rate", "give --fps", [](Swing& swing) {
+                   for (TimedPose& pose : swing.poses) pose.time_s *= 0.4;
+                 }});
+  all.push_back({"held at 4 Hz", "held", [](Swing& swing) {
+                   auto& joints = swing.joints.joints;
+                   for (std::size_t i = 0; i < joints.size(); ++i) joints[i] = joints[i - i % 12];
+                 }});
+  all.push_back({"0.5 s of frames missing", "frames are missing", [](Swing& swing) {
+                   for (double& time_s : swing.joints.time_s) time_s += time_s > 6 ? 0.5 : 0;
+                 }});
+  return all;
+}
+
+TEST(CalibrationMisfit, Registration) {
+  Answers clean, departed;
+  for (const Recording& recording : recordings()) {
+    const Swing swung = swing(recording);
+    clean.add("clean", "", registration_of(swung));
+    if (clean_only()) continue;
+    for (const JointDeparture& departure : joint_departures()) {
+      Swing changed = swung;
+      departure.apply(changed);
+      departed.add(departure.name, departure.cause, registration_of(changed));
+    }
+  }
+  clean.print("registration, clean"), departed.print("registration, departed");
+  EXPECT_EQ(clean.refused(), 0);
+  EXPECT_EQ(departed.wrong(), 0);
+  EXPECT_GE(departed.named(), 0.8);
+}
+
+// --- camera
+
+const Board board{9, 6, 0.005};
+
+struct BoardDeparture {
+  std::string name, cause;
+  std::function<Camera(std::size_t, Camera)> camera = [](std::size_t, Camera c) { return c; };
+  std::function<cv::Mat(std::size_t, const cv::Mat&)> image = [](std::size_t, const cv::Mat& bgr) { return bgr; };
+};
+
+std::vector<BoardDeparture> board_departures() {
+  std::vector<BoardDeparture> all;
+  const auto zoomed = [](double by) {
+    return [=](std::size_t i, Camera camera) {
+      if (i % 2 != 0) camera.fx_px *= 1 + by, camera.fy_px *= 1 + by;
+      return camera;
+    };
+  };
+  for (const double by : {0.2, 0.05, 0.01, 0.003})
+    all.push_back({"half of the views zoomed by " + std::to_string(by).substr(0, 5), "focal length", zoomed(by)});
+  BoardDeparture turned{"every second image turned", "principal point"};
+  turned.image = [](std::size_t i, const cv::Mat& bgr) {
+    cv::Mat upside_down = bgr;
+    if (i % 2 != 0) cv::rotate(bgr, upside_down, cv::ROTATE_180);
+    return upside_down;
+  };
+  all.push_back(turned);
+  for (const double px : {10.0, 1.0}) {
+    BoardDeparture rolling{"a rolling shutter, " + std::to_string(px).substr(0, 4) + " px", "shutter"};
+    rolling.image = [=](std::size_t i, const cv::Mat& bgr) {
+      cv::Mat sheared;
+      const double part = (i % 3 == 0 ? 1 : i % 3 == 1 ? -1 : 0.5) * px / bgr.rows;
+      cv::warpAffine(bgr, sheared, cv::Matx23d(1, part, -part * bgr.rows / 2, 0, 1, 0), bgr.size(), cv::INTER_CUBIC,
+                     cv::BORDER_REPLICATE);
+      return sheared;
+    };
+    all.push_back(rolling);
+  }
+  return all;
+}
+
+Answer camera_of(const Recording& recording, const BoardDeparture& departure) {
+  constexpr int views = 12;
+  const Camera truth = laboratory(recording.seed).camera;
+  BoardScene scene;
+  scene.noise *= recording.noise;
+  BoardViews shown(board, views);
+  const auto poses = board_poses(scene, truth, views, 100 * recording.seed);
+  for (std::size_t i = 0; i < poses.size(); ++i)
+    shown.add(std::to_string(i),
+              departure.image(i, render_board(scene, departure.camera(i, truth), poses[i], 1000 * recording.seed + i)),
+              true);
+  const CameraCalibration found = calibrate_camera(board, shown.take(), {});
+  if (!found.refusal.empty()) return {found.refusal, {}};
+  const Camera& camera = found.camera;
+  const CameraSigmas& sigmas = found.sigmas;
+  Answer answer{"", {}, found.faults};
+  answer.errors = {(camera.fx_px - truth.fx_px) / sigmas.fx_px, (camera.cx_px - truth.cx_px) / sigmas.cx_px,
+                   (camera.cy_px - truth.cy_px) / sigmas.cy_px};
+  for (std::size_t i = 0; i < 4; ++i)
+    answer.errors.push_back((camera.distortion[i] - truth.distortion[i]) / sigmas.distortion[i]);
+  return answer;
+}
+
+TEST(CalibrationMisfit, Camera) {
+  Answers clean, departed;
+  for (const Recording& recording : recordings()) {
+    clean.add("clean", "", camera_of(recording, {}));
+    if (clean_only()) continue;
+    for (const BoardDeparture& departure : board_departures())
+      departed.add(departure.name, departure.cause, camera_of(recording, departure));
+  }
+  clean.print("camera, clean"), departed.print("camera, departed");
+  EXPECT_EQ(clean.refused(), 0);
+  EXPECT_EQ(departed.wrong(), 0);
+  EXPECT_GE(departed.named(), 0.8);
+}
+
+// --- marker
+
+// Every boundary off by up to 0.25 mm, at either edge by itself; half of the prints with a gap.
+Marker cut_by_hand(const Marker& nominal, Random& random) {
+  PrintShape shape = PrintShape::of(nominal);
+  const auto off_m = [&] { return random.uniform(-0.25e-3, 0.25e-3); };
+  for (std::size_t k = 1; k < 4; ++k) shape.upper_m[k] += off_m();
+  for (std::size_t k = 0; k < 4; ++k) shape.lower_m[k] += off_m();
+  shape.gap_rad = random.uniform() < 0.5 ? 0 : 0.8e-3 / nominal.radius_m();
+  return shape.on(nominal);
+}
+
+// From a turn there and back, in whose middle the lower edge slips; the truth is the mean of both prints.
+Answer marker_of(const Recording& recording, double slip_m) {
+  const Rig nominal = laboratory(recording.seed);
+  Random random(recording.seed);
+  const Marker before = cut_by_hand(nominal.instruments[0].marker, random);
+  const auto slipped = [&](double by_m) {
+    PrintShape shape = PrintShape::of(before);
+    for (double& lower_m : shape.lower_m) lower_m += by_m;
+    return shape.on(before);
+  };
+  Rig truth = nominal;
+  const cv::Mat tissue = make_tissue(truth.camera.width_px, truth.camera.height_px, recording.seed);
+  std::vector<Renderer> renderers;
+  for (const double by_m : {0.0, slip_m}) {
+    truth.instruments[0].marker = slipped(by_m);
+    renderers.emplace_back(truth.camera, shafts_of(truth), tissue, with_noise(recording.noise));
+  }
+  const int count = recording.compressed ? 360 : 96;
+  KeyFrames frames(nominal, 0);
+  show(
+      count, recording.compressed ? 30 : 8, recording.compressed,
+      [&](int i) {
+        const double part = static_cast<double>(i) / count, turn = part < 0.5 ? 2 * part : 2 - 2 * part;
+        JointVector q = swinging(nominal, 0, recording.seed);
+        q.theta_rad = 0.02 * std::sin(6 * part), q.phi_rad = 1.57 + 0.02 * std::cos(9 * part);
+        q.psi_rad = -3 + 1.05 * two_pi * turn;
+        return renderers[part < 0.5 ? 0 : 1].render({placement_of(nominal.instruments[0], q)},
+                                                    1000 * recording.seed + static_cast<std::uint64_t>(i));
+      },
+      [&](const cv::Mat& bgr, double time_s) { frames.add(bgr, time_s); });
+  const MarkerCalibration found = calibrate_marker(nominal, 0, frames.take());
+  if (!found.refusal.empty()) return {found.refusal, {}};
+  const Marker& is = found.marker;
+  const Marker expected = slipped(slip_m / 2);
+  Answer answer{"", {}, found.faults};
+  for (std::size_t i = 0; i < 3; ++i) {
+    answer.errors.push_back((is.bands_upper_m[i] - expected.bands_upper_m[i]) / (*is.sigmas.bands_upper_m)[i]);
+    answer.errors.push_back((is.bands_lower_m[i] - expected.bands_lower_m[i]) / (*is.sigmas.bands_lower_m)[i]);
+  }
+  answer.errors.push_back((is.wrap_m - expected.wrap_m) / *is.sigmas.wrap_m);
+  answer.errors.push_back((is.skew_m - expected.skew_m) / *is.sigmas.skew_m);
+  return answer;
+}
+
+TEST(CalibrationMisfit, Marker) {
+  Answers clean, departed;
+  for (const Recording& recording : recordings()) {
+    clean.add("clean", "", marker_of(recording, 0));
+    if (clean_only()) continue;
+    for (const double slip_m : {0.4e-3, 0.1e-3, 0.03e-3})
+      departed.add("edge slips by " + std::to_string(1e3 * slip_m).substr(0, 4) + " mm", "slips",
+                   marker_of(recording, slip_m));
+  }
+  clean.print("marker, clean"), departed.print("marker, departed");
+  EXPECT_EQ(clean.refused(), 0);
+  EXPECT_EQ(departed.wrong(), 0);
+  EXPECT_GE(departed.named(), 0.8);
+}
+
+}  // namespace
+}  // namespace lapservo::acceptance
