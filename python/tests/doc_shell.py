@@ -7,6 +7,7 @@ import re
 import shutil
 import signal
 import subprocess
+import sys
 import tempfile
 import time
 
@@ -18,7 +19,9 @@ import lapservo
 BUILD = pathlib.Path(TOOL).resolve().parent
 
 #: What goes on beside the block's other lines.
-SERVICES = re.compile(r"(\S*lapservo sim-robot|rosmaster) ")
+SERVICES = re.compile(r"(\S*lapservo sim-robot|rosmaster|python3 \S*crtk_bridge.py) ")
+#: Said when they are there.
+READY = "Ctrl-C ends this"
 #: What is stopped as soon as it says this, or this file is there, from which on it does what the page is about: the rest takes
 #: minutes, or has no end.
 ENOUGH = {
@@ -26,7 +29,7 @@ ENOUGH = {
     r"\S*lapservo calibrate all ": r"\ncamera: ",
     r"\S*lapservo view ": "page: http://127.0.0.1",
     r"\S*lapservo servo .*--robot ros[12]:": "  track\n",
-    r"\S*lapservo sim-robot ": "Ctrl-C ends this",
+    SERVICES.pattern: READY,
 }
 #: A device that is not here: the line is right when that is all that is said.
 CAMERA, NO_CAMERA = "/dev/video0", "/dev/video-none"
@@ -79,7 +82,7 @@ class Shell:
     def __init__(self, folder):
         self.folder, self.port = folder, free_port()
         self.environment = os.environ | {
-            "PATH": f"{BUILD}:{os.environ['PATH']}", "PYTHONPATH": str(pathlib.Path(lapservo.__file__).resolve().parents[1]),
+            "PATH": f"{BUILD}:{pathlib.Path(sys.executable).parent}:{os.environ['PATH']}", "PYTHONPATH": str(pathlib.Path(lapservo.__file__).resolve().parents[1]),
             "ROS_LOCALHOST_ONLY": "1", "ROS_DOMAIN_ID": str(20 + os.getpid() % 50), "ROS_IP": "127.0.0.1",
             "ROS_MASTER_URI": f"http://127.0.0.1:{self.port}", "ROS_LOG_DIR": str(folder)}
 
@@ -117,7 +120,7 @@ class Shell:
                 if command.startswith("rosmaster"):
                     wait_for_master(self.environment["ROS_MASTER_URI"])
                 else:
-                    services[-1].wait_for(ENOUGH[r"\S*lapservo sim-robot "])
+                    services[-1].wait_for(READY)
             yield
             for service in services:
                 assert service.process.poll() is None, service.said()

@@ -93,7 +93,8 @@ def test_the_lists_name_what_there_is():
 
 
 def furnish(folder, sample):
-    (folder / "configs").symlink_to(SOURCE / "configs")
+    for name in ("configs", "examples"):
+        (folder / name).symlink_to(SOURCE / name)
     (folder / "build").symlink_to(BUILD)
     (folder / "arm.yaml").symlink_to(SOURCE / "configs" / "paper.yaml")
     for name in ("boards", "boards.mp4"):
