@@ -200,7 +200,7 @@ void add_arm_options(Command command, ServoOptions& options) {
       .add_option("--control", options.control,
                   "Who may say stop and start, and set goals: the page of --web, the topics, which anybody in the "
                   "network may publish, both, or nobody but Ctrl-C")
-      .one_of({"none", "page", "topics", "page,topics"});
+      .one_of({"none", "page", "topics", "both"});
   command.add_option("--operator-present", options.operator_present,
                      "Move the arm only while a button is pressed, and said to be every 0.2 s: of this topic, a "
                      "std_msgs/Bool or the first of a sensor_msgs/Joy; `page`: that of --web's page");
