@@ -37,6 +37,8 @@ NOT_RUN = {
     "ctest ": "runs the tests that this is one of",
     "rosbag record": "is ROS's own; swing.bag is what `lapservo record` wrote in the line before",
     "ssh ": "another computer",
+    "docker ": "needs Docker's daemon",
+    "cd ros2_ws && colcon ": "needs ROS 2; the test ros2.lapservo_msgs builds the package",
 }
 
 #: Files that pages show, by how their paths begin, and the test that runs them or reads them.
@@ -93,7 +95,7 @@ def test_the_lists_name_what_there_is():
 
 
 def furnish(folder, sample):
-    for name in ("configs", "examples"):
+    for name in ("configs", "examples", "transports"):
         (folder / name).symlink_to(SOURCE / name)
     (folder / "build").symlink_to(BUILD)
     (folder / "arm.yaml").symlink_to(SOURCE / "configs" / "paper.yaml")
