@@ -94,6 +94,18 @@ def test_the_lists_name_what_there_is():
         assert [block.language for block in BLOCKS if block.page.name == page] == languages
 
 
+def test_the_controllers_page_has_each_key():
+    page = (SOURCE / "docs" / "controller.md").read_text()
+    rig = lapservo.Rig.load(SOURCE / "configs" / "paper.yaml")
+    written = lapservo.Controller(rig).to_yaml()
+    keys = re.findall(r"^\| `(\w+)` \|", page.split("## Controller")[1], re.MULTILINE)
+    assert sorted(keys) == sorted(re.findall(r"^(\w+):", written, re.MULTILINE))
+    for key in re.findall(r"(\w+)(?=:)", written):
+        assert f"`{key}`" in page
+    defaults = lapservo.Controller(rig).to_yaml().split("limits:")[1]
+    assert all(numbers in page for numbers in re.findall(r"\[.*?\]", defaults))
+
+
 def furnish(folder, sample):
     for name in ("configs", "examples", "transports"):
         (folder / name).symlink_to(SOURCE / name)
