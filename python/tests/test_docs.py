@@ -15,6 +15,7 @@ import pytest
 from conftest import SOURCE
 from doc_blocks import BLOCKS, PAGES
 from doc_shell import BUILD, Shell
+from recordings import TOOL
 
 import lapservo
 
@@ -92,6 +93,15 @@ def test_the_lists_name_what_there_is():
     for page, (test, languages) in ELSEWHERE.items():
         assert page.split(".")[0] in (SOURCE / test).read_text()
         assert [block.language for block in BLOCKS if block.page.name == page] == languages
+
+
+def test_readmes_figures_of_rotation_are_the_demos(tmp_path):
+    readme = (SOURCE / "README.md").read_text()
+    said = subprocess.run([TOOL, "experiment", "rotation", "--out", tmp_path / "results"], check=True, capture_output=True,
+                          text=True).stdout
+    for row, line in (("the paper's method in lapservo", "its method here"), ("lapservo", "the default here")):
+        measured = re.search(rf"standard deviation of all trials together\n(?:.*\n)*?\s+{line}\s+(.*)\n", said)[1]
+        assert f"| {row}, **rendered frames** | {measured} |" in readme, said
 
 
 def test_the_controllers_page_has_each_key():
