@@ -238,7 +238,8 @@ void add_control_options(Command command, ServoOptions& options) {
                   "surface: all visible lines; centerline: the paper's Algorithm 1. Without it centerline with "
                   "--method paper, else surface")
       .one_of({"surface", "centerline"});
-  command.add_option("--controller", options.controller, "YAML: gains_per_s, limits, window, delay_s ...");
+  command.add_option("--controller", options.controller,
+                     "YAML: gains_per_s, limits, window, delay_s ..., see docs/controller.md");
   command.add_option("--delay-ms", options.delay, "The images' age, or `estimate`");
   command.add_option("--rcm-px", options.rcm_px, "Image of the RCM u,v, for --method uncalibrated")
       .finite_number()
