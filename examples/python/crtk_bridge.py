@@ -43,6 +43,8 @@ def bridge(robot, arm):
         setpoint = arm.new_setpoint()  # None while lapservo holds: the robot stays where it was sent
         if setpoint is not None and robot.enabled:
             robot.goal = np.array(setpoint) * OWN_UNITS
+        if not robot.enabled:
+            robot.goal = robot.joints
         state = "ENABLED" if robot.enabled else "PAUSED"  # FAULT after an emergency stop
         arm.publish(robot.read() / OWN_UNITS, robot.goal / OWN_UNITS, state, is_homed=True, is_busy=False)
         time.sleep(0.004)
@@ -58,4 +60,6 @@ print(f"{sys.argv[1]} and /endoscope/image_raw are there; Ctrl-C ends this", flu
 try:
     bridge(robot, arm)
 except KeyboardInterrupt:
+    pass
+finally:
     ended.set()

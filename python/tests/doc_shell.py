@@ -7,7 +7,6 @@ import re
 import shutil
 import signal
 import subprocess
-import sys
 import tempfile
 import time
 
@@ -19,7 +18,7 @@ import lapservo
 BUILD = pathlib.Path(TOOL).resolve().parent
 
 #: What goes on beside a block's other lines.
-SERVICES = re.compile(r"(\S*lapservo sim-robot|rosmaster|python3 \S*crtk_bridge.py) ")
+SERVICES = re.compile(r"(\S*lapservo sim-robot|rosmaster|\S*python3 \S*crtk_bridge.py) ")
 #: Said when they are there.
 READY = "Ctrl-C ends this"
 #: A loop with an arm, beside which a block's next one goes on.
@@ -83,7 +82,7 @@ class Shell:
     def __init__(self, folder):
         self.folder, self.port = folder, free_port()
         self.environment = os.environ | {
-            "PATH": f"{BUILD}:{pathlib.Path(sys.executable).parent}:{os.environ['PATH']}", "PYTHONPATH": str(pathlib.Path(lapservo.__file__).resolve().parents[1]),
+            "PATH": f"{BUILD}:{os.environ['PATH']}", "PYTHONPATH": str(pathlib.Path(lapservo.__file__).resolve().parents[1]),
             "ROS_LOCALHOST_ONLY": "1", "ROS_DOMAIN_ID": str(20 + os.getpid() % 50), "ROS_IP": "127.0.0.1",
             "ROS_MASTER_URI": f"http://127.0.0.1:{self.port}", "ROS_LOG_DIR": str(folder)}
 
