@@ -1,6 +1,5 @@
-# lapservo's packages in Debian 12: docker build -t lapservo . && docker run --rm -v "$PWD:/data" lapservo track video.mp4 --rig rig.yaml
-# The packages are built from the commit that is checked out; .git is needed for that. Not tried with Docker itself: there was none where
-# this was written. What it runs, `./dev package` and apt in a bare Debian 12, is (docs/packages.md).
+# lapservo's packages in Debian 12, built from the commit that is checked out (.git is needed). How to run it, with network, devices and
+# priorities: docs/docker.md. Not tried with Docker itself; what it runs, `./dev package` and apt in a bare Debian 12, is (docs/packages.md).
 FROM debian:12-slim AS build
 RUN apt-get update && apt-get install -y --no-install-recommends ca-certificates git
 COPY . /source

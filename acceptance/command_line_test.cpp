@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <regex>
 #include <set>
 #include <string>
 #include <sys/stat.h>
@@ -284,6 +285,13 @@ TEST_F(CommandLine, Markers) {
   expect_done("marker show --rig configs/example.yaml --out out/marker.png");
   expect_in(output(), "by all visible lines");
   expect_in(output(), "222");
+  expect_in(output(), "focal length of 1100 px");
+  const std::string zoomed =
+      in("zoomed.yaml", std::regex_replace(read_file("configs/example.yaml"), std::regex("1100, 0"), "825, 0"));
+  expect_done("marker show --rig " + zoomed);
+  expect_in(output(), "focal length of 825 px");
+  expect_done("marker show --rig configs/example.yaml --focal-px 900");
+  expect_in(output(), "focal length of 900 px");
   empty_out();
   expect_refused("marker design --bands-upper-mm 5,5,10 --bands-lower-mm 10,5,5", {"not decodable"});
   expect_refused("marker design --diameter-mm 8 --length-mm 8", {"do not fit"});

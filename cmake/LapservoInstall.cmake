@@ -1,5 +1,6 @@
 # `cmake --install build --prefix X`: the tool with its manual pages and completion, the libraries with their public headers,
-# what find_package(lapservo) and pkg-config find, example rigs, a picture and the licence. Targets join the exports where
+# what find_package(lapservo) and pkg-config find, example rigs, a picture, ROS 2's
+# package of the message type and the licence. Targets join the exports where
 # they are declared.
 include(CMakePackageConfigHelpers)
 
@@ -14,6 +15,7 @@ install(FILES ${PROJECT_BINARY_DIR}/lapservoConfig.cmake ${PROJECT_BINARY_DIR}/l
         DESTINATION ${package_folder})
 install(DIRECTORY configs/ DESTINATION ${LAPSERVO_INSTALL_CONFIGSDIR})
 install(FILES acceptance/frames/png/0000.png acceptance/frames/png/rig.yaml DESTINATION ${CMAKE_INSTALL_DATADIR}/lapservo/example)
+install(DIRECTORY transports/ros2/msg/lapservo_msgs DESTINATION ${CMAKE_INSTALL_DATADIR}/lapservo)
 install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
 
 if(TARGET lapservo_shared)

@@ -328,6 +328,15 @@ def see_units(browser):
     assert shown == ["-1.2346", "0.0000", "0.00", "0.0", "-10.0"], shown
 
 
+def see_no_broken_image(browser):
+    """Where no image has come yet, its place is empty."""
+    visibility = """(image => { image.removeAttribute('src'); document.body.append(image);
+        const found = getComputedStyle(image).visibility; image.remove(); return found; })"""
+    picture = "document.getElementById('picture')"
+    assert browser.value(f"{visibility}({picture}.cloneNode())") == "hidden"
+    assert browser.value(f"getComputedStyle({picture}).visibility") == "visible"
+
+
 def see_a_picture(browser, tool, rig, picture, folder):
     lapservo, url = start(tool, "view", picture, "--rig", rig, "--web", "0")
     try:
@@ -337,6 +346,7 @@ def see_a_picture(browser, tool, rig, picture, folder):
         state(browser, "ended: 1 of 1 seen")
         see_the_end(browser)
         see_units(browser)
+        see_no_broken_image(browser)
         assert browser.value("document.getElementById('start').hidden"), "nothing here can be started"
         assert not browser.complaints, browser.complaints
         look(browser, folder, "view")

@@ -5,7 +5,7 @@
 #include <lapservo/marker/drawing.h>
 
 int main(int argc, char** argv) {
-  if (argc != 2) return 2;
+  if (argc != 2) return std::puts("marker_5mm SHEET.pdf"), 2;
   lapservo::DesignSpec spec;
   spec.diameter_m = 0.005;
   spec.viewing = {.focal_px = 1100, .distance_m = 0.08};

@@ -4,7 +4,7 @@
 #include <vector>
 
 int main(int argc, char** argv) {
-  if (argc != 3) return 2;
+  if (argc != 3) return std::puts("rcm_image INPUT RIG.yaml"), 2;
   lapservo::Rig rig = lapservo::load_rig(argv[2]);
   for (lapservo::Instrument& instrument : rig.instruments)
     instrument.camera_from_rcm.reset();  // makes the tracker estimate the RCM

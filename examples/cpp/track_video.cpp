@@ -4,7 +4,7 @@
 #include <lapservo/vision/tracker.h>
 
 int main(int argc, char** argv) {
-  if (argc != 3) return 2;
+  if (argc != 3) return std::puts("track_video INPUT RIG.yaml"), 2;
   const lapservo::Rig rig = lapservo::load_rig(argv[2]);
   lapservo::Tracker tracker(rig, {.frame_budget = std::nullopt});
   const auto frames = lapservo::open_frame_source(argv[1], 30);

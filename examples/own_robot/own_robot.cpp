@@ -91,7 +91,7 @@ class Operator : public RunObserver {
 };
 
 int main(int argc, char** argv) {
-  if (argc != 2) return 2;
+  if (argc != 2) return std::puts("own_robot RIG.yaml"), 2;
   const Rig rig = load_rig(argv[1]);
   SecondOrderArm arm({0.05, 1.57, 0.064, 1.2});
   Camera30 camera(rig, arm);

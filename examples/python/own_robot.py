@@ -60,6 +60,8 @@ class Clock(lapservo.Clock):
             self.camera.expose()
 
 
+if len(sys.argv) != 2:
+    sys.exit(__doc__)
 rig = lapservo.Rig.load(sys.argv[1])
 arm = Arm([0.05, 1.57, 0.064, 1.2])
 camera = Camera(rig, arm)

@@ -10,6 +10,8 @@ import lapservo
 matplotlib.use("Agg")
 from matplotlib import pyplot
 
+if len(sys.argv) != 4:
+    sys.exit(__doc__)
 tracker = lapservo.Tracker(lapservo.Rig.load(sys.argv[2]), frame_budget=None)
 rows = []
 for frame in lapservo.open_frames(sys.argv[1]):

@@ -4,6 +4,8 @@ import sys
 
 import lapservo
 
+if len(sys.argv) != 3:
+    sys.exit(__doc__)
 rig = lapservo.Rig.load(sys.argv[2])
 free = lapservo.Rig(rig.camera, [lapservo.Instrument(i.name, i.marker) for i in rig.instruments])
 tracker = lapservo.Tracker(free, frame_budget=None)

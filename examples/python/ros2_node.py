@@ -23,6 +23,8 @@ def on_image(message):
             JointState(header=message.header, name=["theta", "phi", "rho", "psi"], position=list(map(float, seen.q))))
 
 
+if len(sys.argv) != 2:
+    sys.exit(__doc__)
 rclpy.init()
 node = rclpy.create_node("lapservo_example")
 rig = lapservo.Rig.load(sys.argv[1])

@@ -6,6 +6,8 @@ import numpy as np
 
 import lapservo
 
+if len(sys.argv) < 5:
+    sys.exit(__doc__)
 rig = lapservo.Rig.load(sys.argv[2])
 clock = lapservo.SteadyClock()
 controller = lapservo.Controller(rig, period_s=1 / 120, joint_limits=sys.argv[3])

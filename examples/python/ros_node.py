@@ -20,6 +20,8 @@ def on_image(message):
         publishers[seen.instrument].publish(JointState(message.header, ["theta", "phi", "rho", "psi"], list(seen.q), [], []))
 
 
+if len(sys.argv) != 2:
+    sys.exit(__doc__)
 rospy.init_node("lapservo_example")
 rig = lapservo.Rig.load(sys.argv[1])
 tracker = lapservo.Tracker(rig)

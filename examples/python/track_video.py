@@ -4,6 +4,8 @@ import sys
 
 import lapservo
 
+if len(sys.argv) != 3:
+    sys.exit(__doc__)
 rig = lapservo.Rig.load(sys.argv[2])
 tracker = lapservo.Tracker(rig, frame_budget=None)
 for frame in lapservo.open_frames(sys.argv[1]):

@@ -63,16 +63,20 @@ JointMotion turn_motion(const Eigen::Vector4d& start, const JointLimits& limits,
   if (lowest > highest)
     throw InputError(source, "psi", std::to_string(limits.lower[psi]) + " to " + std::to_string(limits.upper[psi]),
                      "room for a turn of " + std::to_string(2 * half_rad) + " rad");
-  const double begin_rad = std::clamp(start[psi], lowest, highest) - half_rad;
-  const double rate = std::min(max_rate, 0.5 * limits.rate[psi]), back_rate = 0.5 * limits.rate[psi];
-  const double acceleration = 0.8 * limits.acceleration[psi], ramp_s = std::max(0.5, rate / acceleration);
-  const double back_rad = std::abs(start[psi] - begin_rad);
-  const double back_s =
-      std::max({1.0, eased_rate * back_rad / back_rate, std::sqrt(eased_acceleration * back_rad / acceleration)});
-  return {back_s + 2 * half_rad / rate + ramp_s, [=](double time_s) -> Eigen::Vector4d {
+  const double start_rad = start[psi], begin_rad = std::clamp(start_rad, lowest, highest) - half_rad;
+  const double end_rad = begin_rad + 2 * half_rad;
+  const double rate = std::min(max_rate, 0.5 * limits.rate[psi]), acceleration = 0.8 * limits.acceleration[psi];
+  const double ramp_s = std::max(0.5, rate / acceleration), turn_s = 2 * half_rad / rate + ramp_s;
+  const auto eased_s = [&](double distance) {
+    return std::max({1.0, eased_rate * std::abs(distance) / (0.5 * limits.rate[psi]),
+                     std::sqrt(eased_acceleration * std::abs(distance) / acceleration)});
+  };
+  const double to_begin_s = eased_s(begin_rad - start_rad), back_s = eased_s(start_rad - end_rad);
+  return {to_begin_s + turn_s + back_s, [=](double time_s) -> Eigen::Vector4d {
             Eigen::Vector4d q = start;
-            q[psi] += (begin_rad - start[psi]) * eased(time_s / back_s);
-            q[psi] += travelled(time_s - back_s, 2 * half_rad, rate, ramp_s);
+            q[psi] += (begin_rad - start_rad) * eased(time_s / to_begin_s);
+            q[psi] += travelled(time_s - to_begin_s, 2 * half_rad, rate, ramp_s);
+            q[psi] += (start_rad - end_rad) * eased((time_s - to_begin_s - turn_s) / back_s);
             return q;
           }};
 }

@@ -58,13 +58,14 @@ TEST(CalibrationMotion, SwingsAsFarAsItsReachAndReturns) {
   }
 }
 
-TEST(CalibrationMotion, TurnsOnceAndALittleMore) {
+TEST(CalibrationMotion, TurnsOnceAndALittleMoreAndReturns) {
   const JointLimits limits;
   const JointMotion motion = turn_motion({0, 1.5, 0.1, 3.5}, limits, "limits");
   double low = 10, high = -10;
   for (double t = 0; t < motion.duration_s; t += step_s)
     low = std::min(low, motion.at(t)[3]), high = std::max(high, motion.at(t)[3]);
   EXPECT_GT(high - low, 6.5);
+  EXPECT_NEAR(motion.at(motion.duration_s)[3], 3.5, 1e-12) << "a swing may need room there";
 }
 
 TEST(CalibrationMotion, RefusesATurnWhereThereIsNoRoom) {

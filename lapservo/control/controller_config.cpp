@@ -32,8 +32,8 @@ void require_positive(const char* field, const Eigen::Vector4d& values) {
 void check_gains(const ControllerConfig& config) {
   for (int i = 0; i < 4; ++i) {
     const double gain = config.gains.per_s[i];
-    require(std::isfinite(gain) && gain >= 0, element("gains.per_s", i), gain, "0 or more per second");
-    require(gain * config.period_s < 1, element("gains.per_s", i), gain, "less than one per control period");
+    require(std::isfinite(gain) && gain >= 0, element("gains_per_s", i), gain, "0 or more per second");
+    require(gain * config.period_s < 1, element("gains_per_s", i), gain, "less than one per control period");
   }
 }
 
@@ -59,7 +59,7 @@ void check_observer(const ObserverConfig& observer) {
   const auto check_delay = [](const std::string& field, double delay_s) {
     require(delay_s >= 0 && delay_s <= longest_s, field, delay_s, "0 to 0.3 seconds");
   };
-  if (observer.delay_s) check_delay("observer.delay_s", *observer.delay_s);
+  if (observer.delay_s) check_delay("delay_s", *observer.delay_s);
   check_delay("observer.initial_delay_s", observer.initial_delay_s);
   require_positive("observer.bandwidth_rad_s", observer.bandwidth_rad_s);
   require_positive("observer.offset_walk", observer.offset_walk);

@@ -659,11 +659,11 @@ TEST(VisualController, NothingMakesItLeaveItsLimits) {
 TEST(VisualController, SaysWhatIsWrongWithAConfiguration) {
   using Change = std::function<void(ControllerConfig&)>;
   const std::vector<std::pair<Change, std::string>> wrongs{
-      {[](ControllerConfig& c) { c.gains.per_s[2] = -1; }, "gains.per_s[2]: is -1"},
+      {[](ControllerConfig& c) { c.gains.per_s[2] = -1; }, "gains_per_s[2]: is -1"},
       {[](ControllerConfig& c) { c.limits.rate[0] = 0; }, "limits.rate[0]"},
       {[](ControllerConfig& c) { c.limits.upper[1] = c.limits.lower[1]; }, "limits.upper[1]"},
       {[](ControllerConfig& c) { c.period_s = 0; }, "period_s"},
-      {[](ControllerConfig& c) { c.observer.delay_s = 1; }, "observer.delay_s"}};
+      {[](ControllerConfig& c) { c.observer.delay_s = 1; }, "controller: delay_s: is 1"}};
   for (const auto& [change, word] : wrongs) {
     ControllerConfig config;
     change(config);

@@ -29,6 +29,7 @@ TEST(KnownKeys, NamesTheNearest) {
             "a.yaml: hues_dg: is unknown, expected a known key, of which hues_deg is the nearest");
   EXPECT_EQ(complaint("sigma_hues: 1"),
             "a.yaml: sigma_hues: is unknown, expected a known key, of which sigma_hues_deg is the nearest");
+  EXPECT_EQ(complaint("seam: 1"), "a.yaml: seam: is unknown, expected a known key, of which seam_rad is the nearest");
   EXPECT_EQ(complaint("sigma_name: 1"),
             "a.yaml: sigma_name: is unknown, expected a known key, of which name is the nearest");
   EXPECT_EQ(complaint("nme: x\nseam_rad: 1\nhues: 2\ngap: 3"),

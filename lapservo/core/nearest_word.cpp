@@ -27,9 +27,11 @@ std::size_t edit_distance(std::string_view from, std::string_view to) {
 const std::string& nearest_word(std::string_view word, const std::vector<std::string>& words) {
   constexpr std::size_t longest = 64;  // the time goes with the product of the lengths
   word = word.substr(0, longest);
-  return *std::min_element(words.begin(), words.end(), [&](const std::string& a, const std::string& b) {
-    return edit_distance(word, a) < edit_distance(word, b);
-  });
+  const auto distance = [&](const std::string& other) {
+    return std::pair(!other.starts_with(word), edit_distance(word, other));
+  };
+  return *std::min_element(words.begin(), words.end(),
+                           [&](const std::string& a, const std::string& b) { return distance(a) < distance(b); });
 }
 
 }  // namespace lapservo::internal

@@ -129,4 +129,16 @@ DecodedImage decode(const CompressedImageMessage& message) {
   }
 }
 
+ImageMessage bgr8_message(const cv::Mat& bgr, double stamp_s) {
+  ImageMessage message;
+  message.stamp_s = stamp_s;
+  message.width = static_cast<std::uint32_t>(bgr.cols);
+  message.height = static_cast<std::uint32_t>(bgr.rows);
+  message.step = 3 * message.width;
+  message.encoding = "bgr8";
+  const cv::Mat whole = bgr.isContinuous() ? bgr : bgr.clone();
+  message.data.assign(whole.data, whole.data + whole.total() * whole.elemSize());
+  return message;
+}
+
 }  // namespace lapservo::internal

@@ -40,6 +40,17 @@ TEST(ImageDecoder, ChannelsStepAndByteOrder) {
   EXPECT_EQ(bgr_at(decode(deep), 1, 2), cv::Vec3b(byte(deep, 1, 16), byte(deep, 1, 14), byte(deep, 1, 12)));
 }
 
+TEST(ImageDecoder, AnImageIsTheMessageThatItIsDecodedFrom) {
+  const cv::Mat whole(5, 7, CV_8UC3);
+  cv::randu(whole, 0, 256);
+  const cv::Mat part = whole(cv::Rect(1, 1, 4, 3));
+  for (const cv::Mat& bgr : {whole, part}) {
+    const ImageMessage message = bgr8_message(bgr, 2.5);
+    EXPECT_EQ(message.stamp_s, 2.5);
+    EXPECT_EQ(cv::norm(std::get<cv::Mat>(decode(message)), bgr, cv::NORM_INF), 0);
+  }
+}
+
 TEST(ImageDecoder, ADecodedImageIsItsOwn) {
   ImageMessage message = message_of("bgr8", 3);
   const DecodedImage image = decode(message);

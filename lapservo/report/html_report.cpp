@@ -27,6 +27,7 @@ caption{text-align:left;color:var(--soft);padding:.3rem 0}
 th,td{border-bottom:1px solid var(--edge);padding:.35rem .7rem;text-align:right;vertical-align:top}
 td{white-space:nowrap}.words td{white-space:normal}.words td:first-child{min-width:14em}
 .words tr.part td{font-weight:600;padding-top:1rem}
+.good{color:var(--c2)}.bad{color:var(--c1)}
 .warning{border:2px solid var(--c1);border-radius:6px;padding:.6rem;font-weight:600}
 th:first-child,td:first-child{text-align:left}.words td,.words th{text-align:left}
 thead th{border-bottom:2px solid var(--grey)}
@@ -160,8 +161,14 @@ std::string paragraphs(const std::vector<std::string>& text) {
   return html;
 }
 
+const char* colour_of(Verdict verdict) {
+  if (verdict == Verdict::none) return "";
+  return verdict == Verdict::good ? " class=\"good\"" : " class=\"bad\"";
+}
+
 std::string html_from(const ReportSection& section) {
-  std::string html = fmt::format("<section id=\"{}\">\n<h2>{}</h2>\n", escaped(section.id), escaped(section.title));
+  std::string html = fmt::format("<section id=\"{}\">\n<h2{}>{}</h2>\n", escaped(section.id),
+                                 colour_of(section.verdict), escaped(section.title));
   html += warning(section.unfinished) + paragraphs(section.text);
   if (!section.comparisons.empty()) html += comparison_table(rows_of(section.comparisons));
   if (!section.figures.empty()) {

@@ -34,10 +34,14 @@ struct Figure {
   std::string caption;
 };
 
+/// The colour of a title that says whether something is good enough.
+enum class Verdict { none, good, bad };
+
 /// One experiment. All text is plain.
 struct ReportSection {
   std::string id;  ///< a word: the link to it
   std::string title;
+  Verdict verdict = Verdict::none;
   std::vector<std::string> text = {};
   std::vector<Comparison> comparisons = {};  ///< those that have a figure of the paper's stand in the summary too
   std::vector<Figure> figures = {};

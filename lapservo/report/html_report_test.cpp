@@ -101,6 +101,15 @@ TEST(HtmlReport, SaysAtTheTopThatItIsNotWhole) {
   EXPECT_LT(html.find("stopped in the middle"), html.find("class=\"words\"")) << "before the first figure";
 }
 
+TEST(HtmlReport, ColoursTheTitleThatIsAVerdict) {
+  Report report = sample_report();
+  EXPECT_NE(html_from(report).find("<h2>word</h2>"), std::string::npos);
+  report.sections[0].verdict = Verdict::good;
+  EXPECT_NE(html_from(report).find("<h2 class=\"good\">word</h2>"), std::string::npos);
+  report.sections[0].verdict = Verdict::bad;
+  EXPECT_NE(html_from(report).find("<h2 class=\"bad\">word</h2>"), std::string::npos);
+}
+
 TEST(HtmlReport, LinksToThePapersFiguresAndTables) {
   Report report = sample_report();
   std::get<Plot>(report.sections[0].figures[0].content).title = "Figure 5: one trial";

@@ -58,7 +58,7 @@ TEST(ControllerFile, WhatIsMissingStays) {
 }
 
 TEST(ControllerFile, NamesFileFieldValueAndExpectation) {
-  for (const auto& [text, expected] : {std::pair<const char*, const char*>{"gain: 3\n", "gain"},
+  for (const auto& [text, expected] : {std::pair<const char*, const char*>{"gain: 3\n", "gains_per_s is the nearest"},
                                        {"gains_per_s: [1, 2, 3]\n", "gains_per_s"},
                                        {"gains_per_s: [1, 2, 3, x]\n", "gains_per_s[3]"},
                                        {"gains_per_s: [1, 2, 3, .nan]\n", "gains_per_s[3]"},

@@ -1,9 +1,7 @@
 #pragma once
 
-#include <atomic>
 #include <functional>
 #include <mutex>
-#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -11,6 +9,7 @@
 #include <Eigen/Core>
 
 #include "lapservo/core/bounded_queue.h"
+#include "lapservo/crtk/crtk_arm.h"
 #include "lapservo/crtk/transport.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/robot/operating_state.h"
@@ -25,7 +24,6 @@ struct SimRobotConfig {
   std::string arm = "PSM1";           ///< namespace of the CRTK topics
   std::string camera = "/endoscope";  ///< namespace of image_raw and camera_info
   double joint_rate_hz = 250;         ///< of measured_js and setpoint_js
-  double state_period_s = 0.5;        ///< of operating_state, which is also said when it changes
   /// For tests of who steers it: changes what it says.
   std::function<void(JointMessage&)> alter_measured{};
   std::function<void(ImageMessage&)> alter_image{};
@@ -35,14 +33,12 @@ struct SimRobotConfig {
 struct ServoStatistics {
   long count = 0;
   Eigen::Vector4d max_step = Eigen::Vector4d::Zero();  ///< of q, from the previous setpoint: rad, m
-  double last_s = 0;                                   ///< when the last one came, on the simulator's time
   long wrist_moved = 0, malformed = 0;
 };
 
 /// The simulator behind the topics of a CRTK PSM and its camera: measured_js, setpoint_js, operating_state out,
 /// servo_jp and state_command (enable, disable, pause, resume, home, unhome) in; image_raw, image_raw/compressed where
-/// somebody reads it, camera_info out. It has two
-/// wrist joints more than the rig names. Starts ENABLED and homed.
+/// somebody reads it, camera_info out. It has two wrist joints more than the rig names. Starts ENABLED and homed.
 class SimRobot {
  public:
   /// The rig's first instrument; its `joints`, or default_joints(). The arguments must outlive it.
@@ -57,9 +53,8 @@ class SimRobot {
   ServoStatistics statistics() const;
 
  private:
-  void obey(const JointMessage& message);
-  void obey(const StringMessage& command);
-  void apply(Eigen::Vector4d& target);
+  void obey(const std::string& command);
+  void obey(const std::vector<double>& positions);
   void say_joints();
   void say_state();
   void say_images();
@@ -71,26 +66,18 @@ class SimRobot {
   Simulator& simulator_;
   SimRobotConfig config_;
   Joints joints_;
-  std::vector<std::string> names_;
-  std::vector<double> wrist_;
-  Eigen::Vector4d setpoint_;
-  double next_joints_s_ = 0, next_state_s_ = 0, stamp_at_0_s_ = 0;
+  CrtkArm arm_;
+  Eigen::Vector4d setpoint_, last_wanted_;
+  double next_joints_s_ = 0, stamp_at_0_s_ = 0;
 
-  mutable std::mutex mutex_;  // of what the transport's threads touch
-  std::optional<Eigen::Vector4d> wanted_;
-  Eigen::Vector4d last_wanted_;
+  mutable std::mutex mutex_;  // of what other threads read and set
   ServoStatistics statistics_;
   OperatingState state_ = OperatingState::enabled;
   bool homed_ = true;
-  std::atomic<bool> state_changed_ = true;
-  double now_s_ = 0;
 
-  Transport::Publisher<JointMessage> measured_js_, setpoint_js_;
-  Transport::Publisher<OperatingStateMessage> operating_state_;
   Transport::Publisher<ImageMessage> image_;
   Transport::Publisher<CompressedImageMessage> compressed_;
   Transport::Publisher<CameraInfoMessage> camera_info_;
-  std::vector<Transport::Subscription> subscriptions_;  // they use the others
   BoundedQueue<ImageMessage> to_compress_{1};
   std::thread compressor_;  // last: it uses the others
 };

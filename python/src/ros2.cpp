@@ -5,13 +5,17 @@
 #include <string>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
 #include "lapservo/core/error.h"
+#include "lapservo/crtk/crtk_arm.h"
 #include "lapservo/crtk/crtk_robot.h"
+#include "lapservo/crtk/image_decoder.h"
 #include "lapservo/crtk/image_receiver.h"
 #include "lapservo/rig/rig.h"
+#include "lapservo/robot/operating_state.h"
 #include "lapservo/robot/steady_clock.h"
 #include "python/src/bindings.h"
 #include "python/src/controller.h"
@@ -24,7 +28,8 @@ using namespace internal;
 
 // A node, destroyed after what speaks by it.
 struct Node {
-  Ros2Transport transport{"lapservo"};
+  explicit Node(const char* name = "lapservo") : transport(name) {}
+  Ros2Transport transport;
 };
 
 class Ros2Robot : private Node, public CrtkRobot {
@@ -48,6 +53,33 @@ class Ros2Camera : private Node, public ImageStream {
  private:
   ImageReceiver receiver_;
   Transport::Subscription subscription_;  // last: it uses the receiver
+};
+
+class Ros2Arm : private Node, public CrtkArm {
+ public:
+  Ros2Arm(const std::string& arm, std::vector<std::string> joint_names)
+      : Node("lapservo_arm"), CrtkArm(transport, arm, std::move(joint_names)) {}
+
+  void publish(const Eigen::VectorXd& measured, const Eigen::VectorXd& setpoint, const std::string& state,
+               bool is_homed, bool is_busy) {
+    if (!operating_state_from_string(state))
+      throw InputError("Ros2Arm.publish", "operating_state", state, "DISABLED, ENABLED, PAUSED or FAULT");
+    say_joints(joints({measured.begin(), measured.end()}), joints({setpoint.begin(), setpoint.end()}));
+    say_state({0, state, is_homed, is_busy});
+  }
+};
+
+class Ros2ImagePublisher : private Node {
+ public:
+  explicit Ros2ImagePublisher(const std::string& topic)
+      : Node("lapservo_images"), publisher_(transport.image_publisher(topic)) {}
+
+  void publish(const cv::Mat& bgr, const std::optional<double>& time_s) {
+    publisher_(bgr8_message(bgr, time_s.value_or(transport.stamp_now_s())));
+  }
+
+ private:
+  Transport::Publisher<ImageMessage> publisher_;
 };
 
 // Until the arm's joints are known, so that run() knows where a trajectory begins.
@@ -76,9 +108,7 @@ std::unique_ptr<Ros2Robot> make_robot(const std::string& arm, const Rig& rig, co
   return robot;
 }
 
-}  // namespace
-
-void bind_ros2(py::module_& m) {
+void bind_loop_side(py::module_& m) {
   py::class_<Ros2Robot, Robot>(m, "Ros2Robot", R"(A CRTK arm over ROS 2, behind the interlock of `lapservo servo`.
 
 ROS need not be installed. A thread of its own samples the last path 500 times a second; when anything is amiss nothing
@@ -99,6 +129,51 @@ is sent.)")
            "topic: '/endoscope/image_raw', or '.../compressed'; images must have the size of the rig's camera.")
       .def_property_readonly("dropped", &Ros2Camera::dropped, "counts of images that were not used, or ''")
       .def_property_readonly("complaint", &Ros2Camera::complaint, "why the last of them was not used, or ''");
+}
+
+void bind_arm_side(py::module_& m) {
+  py::class_<Ros2Arm>(m, "Ros2Arm", R"(The topics of a CRTK arm over ROS 2, for a program that moves another robot.
+
+`lapservo servo --robot ros2:ARM` then steers that robot. ROS need not be installed.)")
+      .def(py::init<const std::string&, std::vector<std::string>>(), py::arg("arm"), py::arg("joint_names"),
+           "arm: the namespace, 'PSM1'; joint_names: of all joints, the rig's four among them.")
+      .def(
+          "publish",
+          [](Ros2Arm& self, const Array<"measured", Eigen::Dynamic, 1, Numbers::any>& measured,
+             const Array<"setpoint", Eigen::Dynamic, 1, Numbers::any>& setpoint, const std::string& operating_state,
+             bool is_homed, bool is_busy) {
+            const py::gil_scoped_release others_run;
+            self.publish(measured.value, setpoint.value, operating_state, is_homed, is_busy);
+          },
+          py::arg("measured"), py::arg("setpoint"), py::arg("operating_state") = "ENABLED", py::arg("is_homed") = true,
+          py::arg("is_busy") = false,
+          "measured_js, setpoint_js and operating_state, 100 times a second or more. measured, setpoint: of all "
+          "joints, rad and m, where they are and where the robot was last sent; operating_state: DISABLED, ENABLED, "
+          "PAUSED or FAULT; is_busy: it moves by itself.")
+      .def("new_setpoint", &Ros2Arm::new_setpoint,
+           "The newest setpoint of all joints, rad and m, since the last call, or None. The robot goes there at once.")
+      .def("new_commands", &Ros2Arm::new_commands,
+           "Words of state_command since the last call: enable, disable, pause, resume, home, unhome.")
+      .def_property_readonly("malformed", &Ros2Arm::malformed,
+                             "count of setpoints of other joints, or not finite, which are dropped");
+  py::class_<Ros2ImagePublisher>(m, "Ros2ImagePublisher", "Publishes images on a topic of ROS 2.")
+      .def(py::init<const std::string&>(), py::arg("topic"), "topic: '/endoscope/image_raw'.")
+      .def(
+          "publish",
+          [](Ros2ImagePublisher& self, const Picture<"Ros2ImagePublisher.publish">& image,
+             const std::optional<double>& time_s) {
+            const py::gil_scoped_release others_run;
+            self.publish(image.bgr, time_s);
+          },
+          py::arg("image"), py::arg("time_s") = py::none(),
+          "image: uint8[H, W, 3], blue green red; time_s: when it was exposed, in seconds since 1970; else now.");
+}
+
+}  // namespace
+
+void bind_ros2(py::module_& m) {
+  bind_loop_side(m);
+  bind_arm_side(m);
 }
 
 }  // namespace lapservo::python

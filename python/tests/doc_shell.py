@@ -17,21 +17,24 @@ import lapservo
 
 BUILD = pathlib.Path(TOOL).resolve().parent
 
-#: What goes on beside the block's other lines.
-SERVICES = re.compile(r"(\S*lapservo sim-robot|rosmaster) ")
+#: What goes on beside a block's other lines.
+SERVICES = re.compile(r"(\S*lapservo sim-robot|rosmaster|\S*python3 \S*crtk_bridge.py) ")
+#: Said when they are there.
+READY = "Ctrl-C ends this"
+#: A loop with an arm, beside which a block's next one goes on.
+LOOP, TRACKS = re.compile(r"\S*lapservo servo .*--robot ros[12]:"), "  track\n"
 #: What is stopped as soon as it says this, or this file is there, from which on it does what the page is about: the rest takes
 #: minutes, or has no end.
 ENOUGH = {
     r"\S*lapservo experiment all ": pathlib.Path("results/unfinished/illumination.csv"),
     r"\S*lapservo calibrate all ": r"\ncamera: ",
     r"\S*lapservo view ": "page: http://127.0.0.1",
-    r"\S*lapservo servo .*--robot ros[12]:": "  track\n",
-    r"\S*lapservo sim-robot ": "Ctrl-C ends this",
+    LOOP.pattern: TRACKS,
 }
 #: A device that is not here: the line is right when that is all that is said.
 CAMERA, NO_CAMERA = "/dev/video0", "/dev/video-none"
 #: What the tests have in its place: a recording for the first camera, any port that is free.
-INSTEAD = {r"lapservo (track|view) 0 ": r"lapservo \1 swing.mp4 ", r"--web\b": "--web 0",
+INSTEAD = {r"lapservo (track|view) 0 ": r"lapservo \1 swing.mp4 ", r"--web\b( \d+)?": "--web 0",
            r"lapservo view\b": "lapservo view --web 0", CAMERA: NO_CAMERA}
 #: Exit code 1: what was found is not good enough, or the arm is not yet where it shall be.
 MAY_BE_1 = re.compile(r"\S*lapservo (check|servo (?!--replay run/)|calibrate all) ")
@@ -117,13 +120,14 @@ class Shell:
                 if command.startswith("rosmaster"):
                     wait_for_master(self.environment["ROS_MASTER_URI"])
                 else:
-                    services[-1].wait_for(ENOUGH[r"\S*lapservo sim-robot "])
+                    services[-1].wait_for(TRACKS if LOOP.match(command) else READY)
             yield
             for service in services:
                 assert service.process.poll() is None, service.said()
 
     def run_all(self, commands):
         own = [command for command in commands if SERVICES.match(command)]
+        own += [command for command in commands if LOOP.match(command)][:-1]
         with self.beside(own):
             for command in commands:
                 if command in own:

@@ -1,5 +1,10 @@
-"""The notebook's display is well-formed and has the object's values."""
+"""The notebook's display is well-formed and has the object's values; a terminal's has a colour."""
 
+import contextlib
+import os
+import pty
+import re
+import subprocess
 import xml.etree.ElementTree as xml
 
 import numpy as np
@@ -39,3 +44,17 @@ def test_a_rig_and_its_marker_show(rig):
     odd = lapservo.Rig(rig.camera, [lapservo.Instrument("a<b&c", rig.instruments[0].marker)])
     assert parsed(odd._repr_html_()).find(".//td").text == "a<b&c"
     assert xml.fromstring(rig.instruments[0].marker._repr_svg_()).tag.endswith("svg")
+
+
+def test_a_verdict_has_a_colour_on_a_terminal(sample):
+    command = [os.environ["LAPSERVO_TOOL"], "check", sample / "video.mp4", "--joints", sample / "swing_joints.csv", "--rig",
+               sample / "truth.yaml"]
+    ours, theirs = pty.openpty()
+    check = subprocess.Popen(command, stdout=theirs, stderr=subprocess.DEVNULL)
+    os.close(theirs)
+    said = ""
+    with contextlib.suppress(OSError):  # the terminal has no other end any more
+        while True:
+            said += os.read(ours, 4096).decode()
+    good = check.wait() == 0
+    assert re.search("\033\\[32mgood enough\033" if good else "\033\\[31mnot good enough.*\033", said), said

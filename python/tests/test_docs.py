@@ -15,6 +15,7 @@ import pytest
 from conftest import SOURCE
 from doc_blocks import BLOCKS, PAGES
 from doc_shell import BUILD, Shell
+from recordings import TOOL
 
 import lapservo
 
@@ -37,6 +38,8 @@ NOT_RUN = {
     "ctest ": "runs the tests that this is one of",
     "rosbag record": "is ROS's own; swing.bag is what `lapservo record` wrote in the line before",
     "ssh ": "another computer",
+    "docker ": "needs Docker's daemon",
+    "cd ros2_ws && colcon ": "needs ROS 2; the test ros2.lapservo_msgs builds the package",
 }
 
 #: Files that pages show, by how their paths begin, and the test that runs them or reads them.
@@ -92,8 +95,30 @@ def test_the_lists_name_what_there_is():
         assert [block.language for block in BLOCKS if block.page.name == page] == languages
 
 
+def test_readmes_figures_of_rotation_are_the_demos(tmp_path):
+    readme = (SOURCE / "README.md").read_text()
+    said = subprocess.run([TOOL, "experiment", "rotation", "--out", tmp_path / "results"], check=True, capture_output=True,
+                          text=True).stdout
+    for row, line in (("the paper's method in lapservo", "its method here"), ("lapservo", "the default here")):
+        measured = re.search(rf"standard deviation of all trials together\n(?:.*\n)*?\s+{line}\s+(.*)\n", said)[1]
+        assert f"| {row}, **rendered frames** | {measured} |" in readme, said
+
+
+def test_the_controllers_page_has_each_key():
+    page = (SOURCE / "docs" / "controller.md").read_text()
+    rig = lapservo.Rig.load(SOURCE / "configs" / "paper.yaml")
+    written = lapservo.Controller(rig).to_yaml()
+    keys = re.findall(r"^\| `(\w+)` \|", page.split("## Controller")[1], re.MULTILINE)
+    assert sorted(keys) == sorted(re.findall(r"^(\w+):", written, re.MULTILINE))
+    for key in re.findall(r"(\w+)(?=:)", written):
+        assert f"`{key}`" in page
+    defaults = lapservo.Controller(rig).to_yaml().split("limits:")[1]
+    assert all(numbers in page for numbers in re.findall(r"\[.*?\]", defaults))
+
+
 def furnish(folder, sample):
-    (folder / "configs").symlink_to(SOURCE / "configs")
+    for name in ("configs", "examples", "transports"):
+        (folder / name).symlink_to(SOURCE / name)
     (folder / "build").symlink_to(BUILD)
     (folder / "arm.yaml").symlink_to(SOURCE / "configs" / "paper.yaml")
     for name in ("boards", "boards.mp4"):

@@ -1,5 +1,6 @@
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -29,6 +30,36 @@ def test_examples_run(tmp_path):
     assert "mrad" in run("marker_5mm.py", tmp_path / "sheet.pdf")
     assert (tmp_path / "sheet.pdf").is_file()
     assert "largest errors" in run("own_robot.py", RIG)
+
+
+def test_an_example_without_arguments_says_what_it_needs():
+    for path in EXAMPLES.glob("*.py"):
+        if path.name not in NOT_RUN:
+            without = subprocess.run([sys.executable, path], capture_output=True, text=True)
+            assert without.returncode == 1 and without.stderr.startswith(f"{path.name} "), without.stderr
+
+
+@pytest.mark.skipif(not hasattr(lapservo, "Ros2Arm"), reason="built without Cyclone DDS")
+def test_another_robot_is_steered_recorded_and_replayed_by_its_bridge(tmp_path):
+    ros = os.environ | {"ROS_LOCALHOST_ONLY": "1", "ROS_DOMAIN_ID": "62"}
+    arm = ["--rig", RIG, "--robot", "ros2:PSM1", "--camera", "ros2:/endoscope/image_raw"]
+
+    def lapservo_does(*arguments):
+        done = subprocess.run([os.environ["LAPSERVO_TOOL"], *arguments], capture_output=True, text=True, env=ros)
+        assert done.returncode == 0, done.stdout + done.stderr
+        return done.stdout
+
+    bridge = subprocess.Popen([sys.executable, EXAMPLES / "crtk_bridge.py", "PSM1", RIG], stdout=subprocess.DEVNULL, env=ros)
+    try:
+        said = lapservo_does("servo", *arm, "--enable-motion", "--joint-limits", SOURCE / "configs/joint_limits/psm-classic.yaml",
+                             "--set-point", "0.9,795,365,212", "--duration", "15", "--out", tmp_path / "run")
+        assert "within 1 px and 5 mrad from" in said
+        lapservo_does("servo", "--replay", tmp_path / "run" / "log.csv")
+        lapservo_does("record", *arm, "--duration", "2", "--out", tmp_path / "bag")
+        lapservo_does("track", tmp_path / "bag", "--rig", RIG, "--out", tmp_path / "seen.csv")
+    finally:
+        bridge.send_signal(signal.SIGINT)
+        assert bridge.wait(20) == 0
 
 
 @pytest.fixture

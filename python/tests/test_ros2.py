@@ -1,6 +1,8 @@
 """An arm and an endoscope over ROS 2, and its bags, in Python."""
 
 import os
+import re
+import shlex
 import subprocess
 import sys
 
@@ -18,16 +20,30 @@ if not hasattr(lapservo, "Ros2Robot"):
 
 
 @pytest.fixture(scope="module")
-def theatre(tmp_path_factory):
-    """The environment of a simulated arm and endoscope, which are at work."""
+def arm():
+    """A simulated arm and endoscope, which are at work, in the environment."""
     environment = {"ROS_LOCALHOST_ONLY": "1", "ROS_DOMAIN_ID": "61"}
     os.environ.update(environment)
-    arm = subprocess.Popen([TOOL, "sim-robot", "--rig", RIG, "--start", ",".join(map(str, Q))], stdout=subprocess.DEVNULL)
-    yield os.environ
+    arm = subprocess.Popen([TOOL, "sim-robot", "--rig", RIG, "--start", ",".join(map(str, Q))], stdout=subprocess.PIPE, text=True)
+    yield arm
     arm.terminate()
     arm.wait()
     for name in environment:
         del os.environ[name]
+
+
+@pytest.fixture
+def theatre(arm):
+    return os.environ
+
+
+def test_the_command_that_the_simulated_arm_prints_moves_it(arm):
+    printed = re.search(r"(lapservo servo .*) moves it", arm.stdout.readline())[1]
+    helped = re.search(r"lapservo servo .*", subprocess.run([TOOL, "sim-robot", "--help"], capture_output=True, text=True).stdout)[0]
+    for command in (printed, helped):
+        _, *arguments = shlex.split(command)
+        ran = subprocess.run([TOOL, *arguments, "--duration", "2"], cwd=SOURCE, capture_output=True, text=True)
+        assert ran.returncode in (0, 1) and "  track\n" in ran.stdout, ran.stdout + ran.stderr
 
 
 def test_an_arm_is_steered_and_a_bag_of_it_is_read(theatre, rig, tmp_path):
@@ -76,3 +92,14 @@ def test_what_is_not_there_is_said(theatre, rig):
         lapservo.Controller(bare, joint_limits=LIMITS)
     with pytest.raises(lapservo.InputError, match="none.yaml"):
         lapservo.Controller(rig, joint_limits="none.yaml")
+
+
+def test_the_arms_side_refuses_what_can_not_be(theatre):
+    side = lapservo.Ros2Arm("OTHER", ["yaw", "pitch"])
+    assert side.new_setpoint() is None and side.new_commands() == [] and side.malformed == 0
+    side.publish([0, 0], np.zeros(2), "PAUSED", is_busy=True)
+    for arguments, expected in ((([0], [0, 0]), "2 names"), (([0, 0], [0, 0], "ON"), "DISABLED, ENABLED"), (("yaw", [0, 0]), "measured")):
+        with pytest.raises(lapservo.InputError, match=expected):
+            side.publish(*arguments)
+    with pytest.raises(lapservo.InputError, match="Ros2ImagePublisher.publish"):
+        lapservo.Ros2ImagePublisher("/other/image_raw").publish(np.zeros((2, 2)))

@@ -1,5 +1,5 @@
 # Writes the IDL of ROS 2 messages as ROS 2's DDS layers see them: type pkg/Name is pkg::msg::dds_::Name_, members end in
-# an underscore, all is final. MSG: the folder of pkg/Name.msg; TYPES: pkg/Name, each after those that it holds; OUT: the
+# an underscore, all is final. MSG: the folder of pkg/msg/Name.msg; TYPES: pkg/Name, each after those that it holds; OUT: the
 # IDL. Constants and default values are not on the wire.
 cmake_minimum_required(VERSION 3.25)
 
@@ -53,7 +53,7 @@ foreach(type IN LISTS TYPES)
   list(GET parts 1 name)
   set(members)
   # By hand: brackets mean something in CMake's lists.
-  file(READ ${MSG}/${type}.msg text)
+  file(READ ${MSG}/${package}/msg/${name}.msg text)
   string(REGEX REPLACE "#[^\n]*" "" text "${text}")
   while(NOT text STREQUAL "")
     string(FIND "${text}" "\n" end)

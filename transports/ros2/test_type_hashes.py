@@ -26,7 +26,7 @@ def field(line, package):
 def description(folder, name):
     """The hash of a type pkg/msg/Name."""
     package = name.split("/")[0]
-    lines = [line.split("#")[0].strip() for line in (folder / (name.replace("/msg/", "/") + ".msg")).read_text().splitlines()]
+    lines = [line.split("#")[0].strip() for line in (folder / (name + ".msg")).read_text().splitlines()]
     return {"type_name": name, "fields": [field(line, package) for line in lines if line]}
 
 

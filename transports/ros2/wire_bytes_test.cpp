@@ -44,8 +44,10 @@ class MessageReader {
 
  private:
   void read_message(const std::string& type, const std::string& prefix) {
-    const std::string package = type.substr(0, type.find('/'));
-    std::ifstream file(testing::source_folder() / "transports/ros2/msg" / (type + ".msg"));
+    const std::size_t slash = type.find('/');
+    const std::string package = type.substr(0, slash);
+    std::ifstream file(testing::source_folder() / "transports/ros2/msg" / package / "msg" /
+                       (type.substr(slash + 1) + ".msg"));
     ASSERT_TRUE(file) << type;
     static const std::regex field(R"(([^\s\[#]+)(\[(\d*)\])?\s+(\w+).*)");
     std::smatch part;

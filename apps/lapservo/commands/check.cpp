@@ -1,8 +1,10 @@
 #include <cstdio>
+#include <cstdlib>
 #include <future>
 #include <memory>
 #include <optional>
 #include <string>
+#include <unistd.h>
 #include <utility>
 
 #include <fmt/format.h>
@@ -25,7 +27,10 @@ namespace {
 
 void print(const CheckedRig& checked) {
   for (const CheckLine& line : check_lines(checked)) std::printf("  %-26s %s\n", line.name.c_str(), line.found.c_str());
-  std::printf("\n%s\n  %s\n", verdict_of(checked).c_str(), region_of(checked).c_str());
+  const bool colours = ::isatty(STDOUT_FILENO) != 0 && !std::getenv("NO_COLOR");
+  const char* colour = !colours ? "" : checked.good_enough() ? "\033[32m" : "\033[31m";
+  std::printf("\n%s%s%s\n  %s\n", colour, verdict_of(checked).c_str(), colours ? "\033[0m" : "",
+              region_of(checked).c_str());
   int rank = 0;
   for (const Advice& advice : checked.advice)
     std::printf("  %d. %s%s\n     do: %s\n     gains: %s\n", ++rank, advice.needed ? "" : "(may be) ",

@@ -269,6 +269,7 @@ void write_check_report(const std::filesystem::path& path, const std::string& in
   ReportSection section;
   section.id = "check";
   section.title = instrument + ": " + verdict_of(checked);
+  section.verdict = checked.good_enough() ? Verdict::good : Verdict::bad;
   section.text.push_back(region_of(checked));
   int rank = 0;
   for (const Advice& advice : checked.advice)

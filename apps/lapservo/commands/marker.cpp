@@ -27,12 +27,16 @@ using namespace internal;
 namespace {
 
 struct ViewingOptions {
-  double focal_px = 1100, distance_mm = 110, sigma_px = 0.1;
-  Viewing viewing() const { return {focal_px, 1e-3 * distance_mm, sigma_px}; }
+  std::optional<double> focal_px;
+  double distance_mm = 110, sigma_px = 0.1;
+  Viewing viewing(double usual_focal_px) const {
+    return {focal_px.value_or(usual_focal_px), 1e-3 * distance_mm, sigma_px};
+  }
 };
 
-void add_viewing(Command command, ViewingOptions& options) {
-  command.add_option("--focal-px", options.focal_px, "Focal length of the camera").number_between(10.0, 1e5);
+void add_viewing(Command command, ViewingOptions& options, const std::string& usual_focal) {
+  command.add_option("--focal-px", options.focal_px, "Focal length of the camera, else " + usual_focal)
+      .number_between(10.0, 1e5);
   command.add_option("--distance-mm", options.distance_mm, "From the camera to the marker").number_between(5.0, 2000.0);
   command.add_option("--sigma-px", options.sigma_px, "Noise of one boundary on one line").number_between(1e-4, 100.0);
 }
@@ -70,7 +74,7 @@ std::string yaml_of(Marker marker) {
   return "marker:\n" + marker_yaml(marker, 2);
 }
 
-constexpr double usual_print_error_m = 0.1e-3;
+constexpr double usual_print_error_m = 0.1e-3, usual_focal_px = 1100;
 
 void print_sigmas(const Marker& marker, const Viewing& viewing, double print_error_m) {
   std::printf("\n  tau [deg]   cross-ratio   sigma [mrad]: centre line   whole surface   print off by %.2f mm\n",
@@ -90,7 +94,7 @@ void print_sigmas(const Marker& marker, const Viewing& viewing, double print_err
 
 int run_design(const DesignOptions& options) {
   if (options.hues_deg.size() != 3) throw InputError("--hues", "needs three hues, like 90,180,270");
-  const Viewing viewing = options.viewing.viewing();
+  const Viewing viewing = options.viewing.viewing(usual_focal_px);
   std::optional<AtomicFile> file;
   if (!options.out.empty()) file.emplace(options.out);
   const bool given = !options.upper_mm.empty() || !options.lower_mm.empty();
@@ -133,8 +137,7 @@ struct RigOptions {
   ViewingOptions viewing;
 };
 
-Instrument chosen(const RigOptions& options) {
-  const Rig rig = load_rig(options.rig);
+Instrument chosen(const RigOptions& options, const Rig& rig) {
   InputFiles inputs;
   inputs.add_rig(options.rig, rig);
   inputs.refuse_as_output(options.out);
@@ -144,7 +147,7 @@ Instrument chosen(const RigOptions& options) {
 }
 
 int run_print(const RigOptions& options) {
-  const Instrument instrument = chosen(options);
+  const Instrument instrument = chosen(options, load_rig(options.rig));
   if (!options.out.ends_with(".svg") && !options.out.ends_with(".pdf"))
     throw InputError("--out", "name", options.out, "one that ends in .pdf or .svg");
   write_print_sheet(options.out, instrument.name, instrument.marker, options.paper == "a4" ? Paper::a4 : Paper::letter,
@@ -174,11 +177,12 @@ void show_in_terminal(const Marker& marker) {
 }
 
 int run_show(const RigOptions& options) {
-  const Instrument instrument = chosen(options);
+  const Rig rig = load_rig(options.rig);
+  const Instrument instrument = chosen(options, rig);
   std::printf("%s: %.2f mm outer diameter, %.2f mm long\n", instrument.name.c_str(), 1e3 * instrument.marker.diameter_m,
               1e3 * instrument.marker.length_m());
   show_in_terminal(instrument.marker);
-  const Viewing viewing = options.viewing.viewing();
+  const Viewing viewing = options.viewing.viewing(rig.camera.fx_px);
   double surface_rad = 0, print_rad = 0;
   for (int i = 0; i < 16; ++i) {
     const double tau_rad = two_pi * (i + 0.5) / 16;
@@ -186,14 +190,15 @@ int run_show(const RigOptions& options) {
     print_rad = std::max(print_rad, predicted_print_error_rad(instrument.marker, tau_rad, usual_print_error_m));
   }
   std::printf(
-      "worst sigma of psi by noise (%.2f px a boundary): %.2f mrad, as lapservo measures it, by all visible lines; "
+      "seen from %.0f mm with a focal length of %.0f px; worst sigma of psi by noise (%.2f px a boundary): %.2f mrad, "
+      "as lapservo measures it, by all visible lines; "
       "%.1f mrad by the centre line alone\n"
       "worst error of psi by boundaries that are printed %.1f mm off: %.0f mrad until `lapservo calibrate marker` has "
       "measured them\n",
-      viewing.sigma_edge_px, 1e3 * surface_rad, 1e3 * worst_sigma_centre_line_rad(instrument.marker, viewing),
-      1e3 * usual_print_error_m, 1e3 * print_rad);
+      1e3 * viewing.distance_m, viewing.focal_px, viewing.sigma_edge_px, 1e3 * surface_rad,
+      1e3 * worst_sigma_centre_line_rad(instrument.marker, viewing), 1e3 * usual_print_error_m, 1e3 * print_rad);
   if (options.out.empty()) return 0;
-  write_marker_picture(options.out, instrument.name, instrument.marker, options.viewing.viewing());
+  write_marker_picture(options.out, instrument.name, instrument.marker, viewing);
   std::printf("image: %s\n", options.out.c_str());
   return 0;
 }
@@ -219,7 +224,7 @@ void add_design(Command parent, Run& run_later) {
       .delimiter(',');
   command.add_option("--bands-lower-mm", options->lower_mm, "and at the lower edge").finite_number().delimiter(',');
   command.add_option("--out", options->out, "Write the marker: block of a rig; a file of that name is replaced");
-  add_viewing(command, options->viewing);
+  add_viewing(command, options->viewing, fmt::format("{:g}", usual_focal_px));
   command.footer(
       "Example:\n  lapservo marker design --diameter-mm 8.4 --distance-mm 110 --out marker.yaml\n"
       "  lapservo marker design --bands-upper-mm 3.5,3.5,17 --bands-lower-mm 9.5,9.5,5");
@@ -253,7 +258,7 @@ void add_marker(Command app, Run& run_later) {
   auto showing = std::make_shared<RigOptions>();
   Command show = add_for_rig(marker, "show", "Show what a rig's marker looks like unrolled.", showing);
   show.add_option("--out", showing->out, "Write an image too: .svg, .pdf or .png; a file of that name is replaced");
-  add_viewing(show, showing->viewing);
+  add_viewing(show, showing->viewing, "the rig's");
   show.footer("Example:\n  lapservo marker show --rig configs/example.yaml --out marker.svg");
   show.runs(run_later, [showing] { return run_show(*showing); });
 }

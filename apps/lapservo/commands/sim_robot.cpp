@@ -3,6 +3,7 @@
 #include <atomic>
 #include <chrono>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <thread>
@@ -57,6 +58,13 @@ void refuse_taken_name(Transport& transport, const SimRobotConfig& config, const
   if (heard) throw InputError("--arm", "is " + arm + ", where an arm is already, expected a name of its own");
 }
 
+// Those that come with the rigs of configs/, wherever these are.
+std::string joint_limits_beside(const std::string& rig) {
+  constexpr auto usual = "joint_limits/psm-classic.yaml";
+  const std::filesystem::path beside = std::filesystem::path(rig).parent_path() / usual;
+  return std::filesystem::exists(beside) ? beside.string() : std::string("configs/") + usual;
+}
+
 int run(const SimRobotOptions& options) {
   if (options.rig.empty())
     throw InputError("--rig", "is missing, expected a rig's YAML, for example configs/paper.yaml");
@@ -82,7 +90,8 @@ int run(const SimRobotOptions& options) {
   const std::string& instrument = rig.instruments.front().name;
   if (options.arm != instrument && options.arm != "SIM_" + instrument)
     std::printf("--instrument %s ", instrument.c_str());
-  std::printf("--enable-motion moves it, Ctrl-C ends this\n");
+  std::printf("--enable-motion --joint-limits %s moves it, Ctrl-C ends this\n",
+              joint_limits_beside(options.rig).c_str());
   std::fflush(stdout);
   SteadyClock clock;
   const double begin_s = clock.now_s();
@@ -118,7 +127,7 @@ void add_sim_robot(Command app, Run& run_later) {
       "Example, in two terminals (ROS_LOCALHOST_ONLY=1 keeps it on this computer):\n"
       "  lapservo sim-robot --rig configs/paper.yaml\n"
       "  lapservo servo --rig configs/paper.yaml --robot ros2:SIM_PSM1 --camera ros2:/endoscope/image_raw "
-      "--enable-motion");
+      "--enable-motion --joint-limits configs/joint_limits/psm-classic.yaml");
   command.runs(run_later, [options] { return run(*options); });
 }
 

@@ -200,7 +200,7 @@ void add_arm_options(Command command, ServoOptions& options) {
       .add_option("--control", options.control,
                   "Who may say stop and start, and set goals: the page of --web, the topics, which anybody in the "
                   "network may publish, both, or nobody but Ctrl-C")
-      .one_of({"none", "page", "topics", "page,topics"});
+      .one_of({"none", "page", "topics", "both"});
   command.add_option("--operator-present", options.operator_present,
                      "Move the arm only while a button is pressed, and said to be every 0.2 s: of this topic, a "
                      "std_msgs/Bool or the first of a sensor_msgs/Joy; `page`: that of --web's page");
@@ -238,7 +238,8 @@ void add_control_options(Command command, ServoOptions& options) {
                   "surface: all visible lines; centerline: the paper's Algorithm 1. Without it centerline with "
                   "--method paper, else surface")
       .one_of({"surface", "centerline"});
-  command.add_option("--controller", options.controller, "YAML: gains_per_s, limits, window, delay_s ...");
+  command.add_option("--controller", options.controller,
+                     "YAML: gains_per_s, limits, window, delay_s ..., see docs/controller.md");
   command.add_option("--delay-ms", options.delay, "The images' age, or `estimate`");
   command.add_option("--rcm-px", options.rcm_px, "Image of the RCM u,v, for --method uncalibrated")
       .finite_number()

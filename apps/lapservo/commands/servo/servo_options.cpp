@@ -106,7 +106,7 @@ std::string trajectory_name(const ServoOptions& options) {
 }  // namespace
 
 bool may_command(const ServoOptions& options, std::string_view who) {
-  return options.control.find(who) != std::string::npos;
+  return options.control == who || options.control == "both";
 }
 
 double periods_per_s(const ServoOptions& options) {

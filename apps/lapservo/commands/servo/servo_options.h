@@ -18,7 +18,7 @@ namespace lapservo::app {
 struct ServoOptions {
   std::string rig, robot, instrument, camera, joint_limits, trajectory = "paper", method = "default", tracker,
                                                             controller, delay = "estimate", out, replay, image_topic,
-                                                            joint_topic, control = "page,topics", operator_present;
+                                                            joint_topic, control = "both", operator_present;
   std::vector<double> set_point, via, start, rcm_px, hide;
   std::vector<double> registration_error;  // 3 x mm
   double latency_ms = 80;

@@ -1,0 +1,69 @@
+#include "lapservo/crtk/crtk_arm.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/core/error.h"
+#include "lapservo/crtk/test_transport.h"
+
+namespace lapservo::internal {
+namespace {
+
+using Positions = std::vector<double>;
+
+TEST(CrtkArm, GivesTheNewestSetpointOnceAndDropsWhatIsNotOfItsJoints) {
+  TestTransport transport;
+  CrtkArm arm(transport, "A", {"a", "b"});
+  EXPECT_FALSE(arm.new_setpoint());
+  const auto say = [&](const std::vector<std::string>& names, const Positions& positions) {
+    transport.say("/A/servo_jp", JointMessage{1, names, positions});
+  };
+  say({"a", "b"}, {1, 2});
+  say({}, {3, 4});
+  EXPECT_EQ(arm.new_setpoint(), Positions({3, 4}));
+  EXPECT_FALSE(arm.new_setpoint());
+  say({"a", "b"}, {5, 6});
+  say({"b", "a"}, {1, 1});
+  say({"a", "b"}, {1});
+  say({"a", "b"}, {1, NAN});
+  EXPECT_EQ(arm.new_setpoint(), Positions({5, 6}));
+  EXPECT_EQ(arm.malformed(), 3);
+}
+
+TEST(CrtkArm, KeepsEveryCommandInItsOrder) {
+  TestTransport transport;
+  CrtkArm arm(transport, "A", {"a"});
+  for (const char* word : {"enable", "home"}) transport.say("/A/state_command", StringMessage{0, word});
+  EXPECT_EQ(arm.new_commands(), std::vector<std::string>({"enable", "home"}));
+  EXPECT_TRUE(arm.new_commands().empty());
+}
+
+TEST(CrtkArm, SaysAStateAtEachChangeAndEveryHalfSecond) {
+  TestTransport transport;
+  CrtkArm arm(transport, "A", {"a"});
+  const auto count = [&] { return transport.sent<OperatingStateMessage>("/A/operating_state").size(); };
+  const OperatingStateMessage enabled{0, "ENABLED", true, false};
+  for (int i = 0; i < 100; ++i, transport.stamp_s += 0.01) arm.say_state(enabled);
+  EXPECT_EQ(count(), 2u);
+  arm.say_state({0, "ENABLED", true, true});
+  arm.say_state({0, "ENABLED", false, true});
+  arm.say_state({0, "PAUSED", false, true});
+  EXPECT_EQ(count(), 5u);
+  EXPECT_EQ(transport.sent<OperatingStateMessage>("/A/operating_state").back().stamp_s, transport.stamp_s);
+}
+
+TEST(CrtkArm, SaysJointsWithNamesAndTheTimeOfNow) {
+  TestTransport transport;
+  CrtkArm arm(transport, "A", {"a", "b"});
+  arm.say_joints(arm.joints({1, 2}), arm.joints({3, 4}));
+  const JointMessage measured = transport.sent<JointMessage>("/A/measured_js").at(0);
+  EXPECT_EQ(measured.names, std::vector<std::string>({"a", "b"}));
+  EXPECT_EQ(measured.positions, Positions({1, 2}));
+  EXPECT_EQ(measured.stamp_s, transport.stamp_s);
+  EXPECT_EQ(transport.sent<JointMessage>("/A/setpoint_js").at(0).positions, Positions({3, 4}));
+  EXPECT_THROW((void)arm.joints({1}), InputError);
+}
+
+}  // namespace
+}  // namespace lapservo::internal
