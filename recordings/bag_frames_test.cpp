@@ -128,6 +128,8 @@ TEST(BagJoints, ThatCanNotBeUsedAreRefused) {
        "the images are stamped by the time since a computer's start"},
       {{{100, {"a", "b", "c"}, {1, 2, 3}}},
        "/PSM1/measured_js: has no positions of the rig's joints b, a, d, c: it names a, b, c"},
+      {{{100, names, {1, 2, 3, 0.4}}, {101, {"a", "b", "c", "d", "b"}, {1, 2, 3, 0.4, 5}}},
+       "/PSM1/measured_js: names the joint b twice in a message, expected each name once"},
       {{{100, names, {1, 2, 3}}}, "has no positions of the rig's joints"},
       {{{100, names, {1, 2, 3, 0.4}}}, "has 1 readings"}};
   for (const auto& [readings, said] : cases) {

@@ -10,6 +10,7 @@
 #include <fmt/ranges.h>
 
 #include "lapservo/core/error.h"
+#include "lapservo/crtk/joint_map.h"
 
 namespace lapservo::internal {
 namespace {
@@ -80,6 +81,8 @@ JointRecording joints_in_bag(const Bag& bag, const BagTopic& topic, const Joints
   while (const auto message = messages->next()) {
     const auto* reading = std::get_if<JointMessage>(&*message);
     if (!reading || !(reading->stamp_s > 0)) continue;
+    if (const std::string twice = repeated_joint(joints, reading->names); !twice.empty())
+      throw InputError(source, fmt::format("names the joint {} twice in a message, expected each name once", twice));
     const auto values = chosen(*reading, joints);
     if (!values) {
       ++recording.of_other_arms;
