@@ -1,15 +1,16 @@
 #include "lapservo/io/frame_source.h"
 
-#include <algorithm>
 #include <chrono>
 #include <system_error>
 #include <utility>
 #include <vector>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "lapservo/core/error.h"
 #include "lapservo/io/image_file.h"
+#include "lapservo/io/pictures/picture_order.h"
 #include "lapservo/io/video/video_reader.h"
 
 namespace lapservo {
@@ -18,14 +19,25 @@ namespace {
 namespace fs = std::filesystem;
 
 struct Pictures {
-  std::vector<fs::path> files;
+  PictureOrder order;
   int unread = 0;  ///< beside them, of formats that are not read
 };
+
+std::string remark_on(const Pictures& pictures, const std::vector<fs::path>& files) {
+  std::vector<std::string> remarks;
+  if (pictures.unread > 0)
+    remarks.push_back(fmt::format("{} images in HEIC or AVIF are left out: convert them to PNG", pictures.unread));
+  if (pictures.order.is_ambiguous)
+    remarks.push_back(fmt::format("points and signs of the numbers in the names decide the order: {}, {} ... {}",
+                                  files[0].filename().string(), files[1].filename().string(),
+                                  files.back().filename().string()));
+  return fmt::format("{}", fmt::join(remarks, "; "));
+}
 
 class PictureSource : public FrameSource {
  public:
   PictureSource(Kind kind, Pictures pictures, double fps)
-      : kind_(kind), files_(std::move(pictures.files)), unread_(pictures.unread), fps_(fps) {}
+      : kind_(kind), files_(std::move(pictures.order.files)), remark_(remark_on(pictures, files_)), fps_(fps) {}
 
   std::optional<Frame> next() override {
     if (next_ == files_.size()) return std::nullopt;
@@ -36,9 +48,7 @@ class PictureSource : public FrameSource {
     low_bits_ += picture.low_bits;
     return frame;
   }
-  std::string remark() const override {
-    return unread_ == 0 ? "" : fmt::format("{} images in HEIC or AVIF are left out: convert them to PNG", unread_);
-  }
+  std::string remark() const override { return remark_; }
   std::string complaint() const override {
     if (low_bits_ == 0 || low_bits_ < next_) return "";
     return "has 16 bits a channel of which at most the lower 12 are used: multiply the values by 16 where the camera "
@@ -51,7 +61,7 @@ class PictureSource : public FrameSource {
  private:
   Kind kind_;
   std::vector<fs::path> files_;
-  int unread_;
+  std::string remark_;
   double fps_;
   std::size_t next_ = 0, low_bits_ = 0;
 };
@@ -127,13 +137,10 @@ Pictures pictures_in(const fs::path& folder) {
     if (has_image_extension(entry.path())) files.push_back(entry.path());
     unread += has_unread_extension(entry.path());
   }
-  // frame9.png comes before frame10.png.
-  std::sort(files.begin(), files.end(),
-            [](const fs::path& a, const fs::path& b) { return strverscmp(a.c_str(), b.c_str()) < 0; });
   if (files.empty())
     throw InputError(folder.string(), std::string("has no images") + (unread > 0 ? " but in HEIC or AVIF" : "") +
                                           ", expected some (png, jpg, bmp, tif, webp, ppm)");
-  return {std::move(files), unread};
+  return {ordered_pictures(std::move(files)), unread};
 }
 
 }  // namespace
@@ -149,7 +156,7 @@ std::unique_ptr<FrameSource> open_frame_source(const std::string& input, double 
   if (fs::is_regular_file(input) && fs::file_size(input) == 0)
     throw InputError(input, "is empty, expected an image or a video");
   if (has_image_extension(input) || has_unread_extension(input))
-    return std::make_unique<PictureSource>(Kind::image, Pictures{{input}}, folder_fps);
+    return std::make_unique<PictureSource>(Kind::image, Pictures{{{input}}}, folder_fps);
   if (!fs::is_regular_file(input)) throw InputError(input, "is no file, expected an image, a folder or a video");
   return std::make_unique<VideoSource>(input, reading);
 }

@@ -19,7 +19,7 @@ struct Frame {
   std::optional<Status> flaw;  ///< why nothing is to be measured in it
 };
 
-/// Frames of an image, a folder of images (sorted by name, numbers in names by value), a video file, a stream
+/// Frames of an image, a folder of images (in the order of the numbers in their names), a video file, a stream
 /// ("rtsp://...") or a camera.
 class FrameSource {
  public:

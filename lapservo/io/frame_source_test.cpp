@@ -79,6 +79,14 @@ TEST(FolderSource, SaysWhatItLeavesOut) {
   EXPECT_EQ(source->remark(), "1 images in HEIC or AVIF are left out: convert them to PNG");
 }
 
+TEST(FolderSource, SaysTheOrderWherePointsDecide) {
+  const testing::TemporaryFolder folder;
+  for (const char* name : {"0.5.png", "0.25.png", "10.5.png", "1.5.png"})
+    write_image(folder / name, cv::Mat(16, 16, CV_8UC3));
+  EXPECT_EQ(open_frame_source(folder.path().string(), 30)->remark(),
+            "points and signs of the numbers in the names decide the order: 0.25.png, 0.5.png ... 10.5.png");
+}
+
 // 12 bits as cameras' drivers leave them, and 16.
 TEST(FolderSource, SaysThatTheUpperBitsAreEmpty) {
   for (const double scale : {1.0, 16.0}) {
