@@ -136,7 +136,8 @@ class VideoReader::State {
     while (av_read_frame(format_.get(), packet_.get()) >= 0) {
       const bool ours = packet_->stream_index == stream_->index;
       if (ours && packets_++ == 0) of_software_ = names_software();
-      if (ours && ((packet_->flags & AV_PKT_FLAG_CORRUPT) != 0 || is_damaged_jpeg(*packet_))) tainted_ = true;
+      if (ours && (packet_->flags & AV_PKT_FLAG_CORRUPT) != 0) tainted_ = true;
+      if (ours && stream_->codecpar->codec_id == AV_CODEC_ID_MJPEG) check_jpeg_packet();
       const int sent = ours ? avcodec_send_packet(decoder_.get(), packet_.get()) : 0;
       av_packet_unref(packet_.get());
       if (ours) return sent >= 0 || sent == AVERROR(EAGAIN);
@@ -156,10 +157,16 @@ class VideoReader::State {
            (encoder && std::string_view(encoder->value).starts_with("Lavc"));
   }
 
-  // FFmpeg's decoder of motion JPEG says nothing where the data go on after the last row: rows are shifted then.
-  bool is_damaged_jpeg(const AVPacket& packet) const {
-    return stream_->codecpar->codec_id == AV_CODEC_ID_MJPEG &&
-           !jpeg_complaint({packet.data, static_cast<std::size_t>(std::max(0, packet.size))}).empty();
+  // FFmpeg's decoder of motion JPEG says nothing where the data go on after the last row: rows are shifted then. Bytes
+  // before a restart marker shift them, too.
+  void check_jpeg_packet() {
+    const auto [complaint, clean] = check_jpeg({packet_->data, static_cast<std::size_t>(std::max(0, packet_->size))});
+    tainted_ = tainted_ || !complaint.empty();
+    const int size = static_cast<int>(clean.size()), more = size - packet_->size;
+    if (clean.empty() || av_packet_make_writable(packet_.get()) < 0) return;
+    if (more > 0 && av_grow_packet(packet_.get(), more) < 0) return;
+    std::copy(clean.begin(), clean.end(), packet_->data);
+    av_shrink_packet(packet_.get(), size);
   }
 
   // Frames predicted from a damaged one are damaged too, up to the next that stands alone.
