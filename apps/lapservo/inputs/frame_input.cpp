@@ -13,10 +13,15 @@
 namespace lapservo::app {
 using namespace internal;
 
+void say_remark(const std::string& input, const std::string& remark) {
+  if (!remark.empty()) std::fprintf(stderr, "lapservo: %s: %s\n", input.c_str(), remark.c_str());
+}
+
 std::unique_ptr<FrameSource> open_frames(const std::string& input, const FrameOptions& options, const Camera* camera) {
   if (is_bag(input)) {
     auto frames = std::make_unique<BagFrames>(open_bag(input), options.image_topic);
     say_if_undistorted(frames->topic(), camera);
+    say_remark(input, frames->remark());
     return read_ahead(std::move(frames));
   }
   refuse_topic_outside_bags("--image-topic", options.image_topic, input);
@@ -24,8 +29,7 @@ std::unique_ptr<FrameSource> open_frames(const std::string& input, const FrameOp
   const VideoReading reading{options.deinterlace || (camera && camera->deinterlace), options.colour_matrix,
                              options.chroma_location};
   auto source = open_camera_or_file(input, options.fps, size, interrupted, reading);
-  if (const std::string remark = source->remark(); !remark.empty())
-    std::fprintf(stderr, "lapservo: %s: %s\n", input.c_str(), remark.c_str());
+  say_remark(input, source->remark());
   return source->kind() == FrameSource::Kind::live ? std::move(source) : read_ahead(std::move(source));
 }
 
