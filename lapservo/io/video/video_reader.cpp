@@ -80,9 +80,9 @@ class VideoReader::State {
   const std::string& remark() const { return remark_; }
 
   std::string complaint() const {
-    constexpr double slack = 0.01;  // durations are rounded, and sound may last longer
-    const double frames_s = 2 / frames_per_second();
-    if (const auto announced_s = duration_s(); announced_s && end_s_ < (1 - slack) * *announced_s - frames_s)
+    constexpr double slack = 0.01;  // durations are rounded
+    const double frames_s = 2 / frames_per_second(), read_s = std::max(end_s_, end_of_all_s_);
+    if (const auto announced_s = duration_s(); announced_s && read_s < (1 - slack) * *announced_s - frames_s)
       return fmt::format("ends early, after {:.2f} of {:.2f} s", end_s_, *announced_s);
     const bool transport = std::string_view(format_->iformat->name) == "mpegts";
     if (transport && format_->pb && avio_size(format_->pb) % transport_packet_bytes != 0) return "ends within a frame";
@@ -135,6 +135,7 @@ class VideoReader::State {
     if (kind_ == Kind::stream) deadline_ = Clock::now() + patience_;
     while (av_read_frame(format_.get(), packet_.get()) >= 0) {
       const bool ours = packet_->stream_index == stream_->index;
+      look_at_end(*packet_);
       if (ours && packets_++ == 0) of_software_ = names_software();
       if (ours && (packet_->flags & AV_PKT_FLAG_CORRUPT) != 0) tainted_ = true;
       if (ours && stream_->codecpar->codec_id == AV_CODEC_ID_MJPEG) check_jpeg_packet();
@@ -143,6 +144,16 @@ class VideoReader::State {
       if (ours) return sent >= 0 || sent == AVERROR(EAGAIN);
     }
     return avcodec_send_packet(decoder_.get(), nullptr) >= 0;
+  }
+
+  // Without a count of frames the duration may be that of sound or subtitles, or include a time before the video
+  // begins.
+  void look_at_end(const AVPacket& packet) {
+    if (stream_->nb_frames > 0 || packet.pts == AV_NOPTS_VALUE) return;
+    const double begin_s =
+        format_->start_time == AV_NOPTS_VALUE ? 0 : static_cast<double>(format_->start_time) / AV_TIME_BASE;
+    const double unit_s = av_q2d(format_->streams[packet.stream_index]->time_base);
+    end_of_all_s_ = std::max(end_of_all_s_, static_cast<double>(packet.pts + packet.duration) * unit_s - begin_s);
   }
 
   // By the first packet, what precedes it or the container.
@@ -243,6 +254,7 @@ class VideoReader::State {
   cv::Mat last_;
   std::optional<double> time_s_;  // of the last frame, since the first
   double end_s_ = 0;              // of the last frame
+  double end_of_all_s_ = 0;       // of all streams, where they have one duration
   double first_s_ = 0;            // the first frame's stamp
   bool stamped_ = false;          // a frame had a stamp
   int packets_ = 0, frames_ = 0, damaged_ = 0;
