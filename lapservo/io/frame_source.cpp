@@ -1,6 +1,9 @@
 #include "lapservo/io/frame_source.h"
 
+#include <array>
 #include <chrono>
+#include <fstream>
+#include <string_view>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -26,7 +29,8 @@ struct Pictures {
 std::string remark_on(const Pictures& pictures, const std::vector<fs::path>& files) {
   std::vector<std::string> remarks;
   if (pictures.unread > 0)
-    remarks.push_back(fmt::format("{} images in HEIC or AVIF are left out: convert them to PNG", pictures.unread));
+    remarks.push_back(
+        fmt::format("{} images in HEIC, AVIF or DICOM are left out: convert them to PNG", pictures.unread));
   if (pictures.order.is_ambiguous)
     remarks.push_back(fmt::format("points and signs of the numbers in the names decide the order: {}, {} ... {}",
                                   files[0].filename().string(), files[1].filename().string(),
@@ -138,9 +142,19 @@ Pictures pictures_in(const fs::path& folder) {
     unread += has_unread_extension(entry.path());
   }
   if (files.empty())
-    throw InputError(folder.string(), std::string("has no images") + (unread > 0 ? " but in HEIC or AVIF" : "") +
+    throw InputError(folder.string(), std::string("has no images") + (unread > 0 ? " but in HEIC, AVIF or DICOM" : "") +
                                           ", expected some (png, jpg, bmp, tif, webp, ppm)");
   return {ordered_pictures(std::move(files)), unread};
+}
+
+void refuse_dicom(const fs::path& path) {
+  constexpr std::size_t preamble = 128;
+  std::array<char, preamble + 4> head{};
+  std::ifstream(path, std::ios::binary).read(head.data(), head.size());
+  if (std::string_view(head.data(), head.size()).substr(preamble) == "DICM")
+    throw InputError(path.string(),
+                     "is DICOM, which is not read: write its frames as PNG into a folder (of dcmtk: "
+                     "dcmj2pnm --all-frames --write-png FILE FOLDER/frame)");
 }
 
 }  // namespace
@@ -155,6 +169,7 @@ std::unique_ptr<FrameSource> open_frame_source(const std::string& input, double 
   if (fs::is_directory(input)) return std::make_unique<PictureSource>(Kind::folder, pictures_in(input), folder_fps);
   if (fs::is_regular_file(input) && fs::file_size(input) == 0)
     throw InputError(input, "is empty, expected an image or a video");
+  if (fs::is_regular_file(input)) refuse_dicom(input);
   if (has_image_extension(input) || has_unread_extension(input))
     return std::make_unique<PictureSource>(Kind::image, Pictures{{{input}}}, folder_fps);
   if (!fs::is_regular_file(input)) throw InputError(input, "is no file, expected an image, a folder or a video");

@@ -162,7 +162,8 @@ bool is_written(const fs::path& path) {
 
 bool has_unread_extension(const fs::path& path) {
   const std::string extension = lower_case(path.extension().string());
-  return extension == ".heic" || extension == ".heif" || extension == ".avif";
+  static constexpr std::array<std::string_view, 5> known{".heic", ".heif", ".avif", ".dcm", ".dicom"};
+  return std::find(known.begin(), known.end(), extension) != known.end();
 }
 
 cv::Mat bgr8_from(const cv::Mat& image, const std::string& source) {

@@ -21,7 +21,7 @@ bool has_jpeg_extension(const std::filesystem::path& path);
 /// Whether write_image() writes what is named so: PNG or JPEG.
 bool is_written(const std::filesystem::path& path);
 
-/// Whether the name ends like that of an image in HEIC or AVIF, which are not read.
+/// Whether the name ends like that of an image in HEIC, AVIF or DICOM, which are not read.
 bool has_unread_extension(const std::filesystem::path& path);
 
 /// An image in 8-bit BGR, and why nothing is to be measured in it: `damaged` when its decoder complained, `few_colours`

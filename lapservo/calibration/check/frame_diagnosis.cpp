@@ -53,7 +53,7 @@ int found_in(const std::vector<cv::Mat>& frames, const Rig& rig, bool deinterlac
   }));
 }
 
-// Of a frame that the tracker refused.
+// The flaw of a frame that the tracker refused.
 std::optional<Status> flaw_in(const std::vector<Observation>& observations) {
   for (const Observation& observation : observations)
     if (observation.status == Status::damaged || observation.status == Status::few_colours) return observation.status;

@@ -1,11 +1,14 @@
 #include "lapservo/io/video/video_reader.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstdint>
+#include <fstream>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 extern "C" {
 #include <libavutil/display.h>
@@ -13,9 +16,11 @@ extern "C" {
 }
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "lapservo/core/error.h"
 #include "lapservo/io/pictures/jpeg_picture.h"
+#include "lapservo/io/tables/numbers.h"
 #include "lapservo/io/video/bgr_converter.h"
 #include "lapservo/io/video/libav.h"
 #include "lapservo/io/video/yuv_colours.h"
@@ -28,6 +33,32 @@ constexpr std::int64_t transport_packet_bytes = 188;
 
 int past(void* deadline) {
   return Clock::now() > *static_cast<Clock::time_point*>(deadline) ? 1 : 0;
+}
+
+// Whether it begins with a box of MP4 or QuickTime, and lacks the one that says where its frames are.
+bool lacks_index(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::array<std::uint8_t, 16> head{};
+  bool is_mp4 = false;
+  for (std::uint64_t at = 0;
+       file.seekg(static_cast<std::streamoff>(at)) && file.read(reinterpret_cast<char*>(head.data()), 16);) {
+    const Numbers numbers{head, true};
+    const std::string_view name(reinterpret_cast<const char*>(&head[4]), 4);
+    if (name == "moov") return false;
+    is_mp4 = is_mp4 || name == "ftyp" || name == "mdat";
+    const std::uint64_t size = numbers.of(0, 4) == 1 ? numbers.of(8, 8) : numbers.of(0, 4);
+    if (size < 8 || !is_mp4) break;
+    at += size;
+  }
+  return is_mp4;
+}
+
+void refuse_known(const std::filesystem::path& path) {
+  if (lacks_index(path))
+    throw InputError(
+        path.string(),
+        "has no index (moov), as of a recorder that was switched off: untrunc GOOD.mp4 FILE repairs it by a "
+        "whole video of the same recorder");
 }
 
 bool turned(const AVStream& stream) {
@@ -100,6 +131,7 @@ class VideoReader::State {
     const bool opened = avformat_open_input(&format, url().c_str(), nullptr, &options) == 0;
     av_dict_free(&options);
     format_.reset(opened ? format : nullptr);
+    if (!opened && kind_ == Kind::file) refuse_known(source_);
     if (!opened || avformat_find_stream_info(format, nullptr) < 0)
       throw InputError(source_, kind_ == Kind::file ? "can't be read, expected an image or a video"
                                                     : "can't be opened, expected a camera or stream");
@@ -125,6 +157,7 @@ class VideoReader::State {
     decoder_->thread_count = codec->id == AV_CODEC_ID_MPEG2VIDEO ? 0 : 1;
     decoder_->thread_type = FF_THREAD_SLICE;
     decoder_->err_recognition = AV_EF_CRCCHECK | AV_EF_BITSTREAM | AV_EF_BUFFER | AV_EF_EXPLODE;
+    decoder_->framerate = {0, 1};  // what the frames say, not the demuxer
     if (codec->id == AV_CODEC_ID_H264) decoder_->err_recognition |= AV_EF_AGGRESSIVE;
     if (avcodec_open2(decoder_.get(), codec, nullptr) < 0)
       throw InputError(source_, "can't be decoded, expected a video");
@@ -158,6 +191,7 @@ class VideoReader::State {
 
   // By the first packet, what precedes it or the container.
   bool names_software() const {
+    if (is_codec_of_recorders(stream_->codecpar->codec_id)) return false;
     const auto names = [](const std::uint8_t* data, int size) {
       constexpr int most = 4096;
       return data && size > 0 && names_software_encoder({data, static_cast<std::size_t>(std::min(most, size))});
@@ -225,6 +259,26 @@ class VideoReader::State {
     return std::nullopt;
   }
 
+  void note_remarks() {
+    std::vector<std::string> remarks;
+    if (!given_.matrix) remarks.push_back(remark_on_matrix(*frame_, of_software_));
+    if (has_assumed_rate())
+      remarks.push_back(
+          fmt::format("names no times and no rate: read as {:.6g} frames/s (ffmpeg -framerate RATE -i IN -c copy "
+                      "OUT.mp4 writes them)",
+                      frames_per_second()));
+    std::erase(remarks, "");
+    remark_ = fmt::format("{}", fmt::join(remarks, "; "));
+  }
+
+  // Data without a container, whose frames do not say it either.
+  bool has_assumed_rate() const {
+    const AVInputFormat& container = *format_->iformat;
+    const bool has_times =
+        (container.flags & AVFMT_NOTIMESTAMPS) == 0 && !std::string_view(container.name).ends_with("_pipe");
+    return kind_ == Kind::file && !has_times && decoder_->framerate.num <= 0;
+  }
+
   // By each frame's own tags: a stream's may change.
   void convert() {
     const auto colours = yuv_colours_of(*frame_, stream_->codecpar->codec_id, of_software_, given_);
@@ -234,7 +288,7 @@ class VideoReader::State {
                        "scale=out_color_matrix=bt709 -colorspace bt709 OUT)");
     if (!converter_.convert(*frame_, *colours, fields_, last_))
       throw InputError(source_, "has pixels of a kind that can't be converted, expected a video");
-    if (frames_ == 0 && !given_.matrix) remark_ = remark_on_matrix(*frame_, of_software_);
+    if (frames_ == 0) note_remarks();
   }
 
   std::string source_;

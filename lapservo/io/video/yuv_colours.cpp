@@ -64,6 +64,12 @@ ChromaSite site_of(const AVFrame& frame, AVCodecID codec, bool from_rgb) {
 
 }  // namespace
 
+bool is_codec_of_recorders(AVCodecID codec) {
+  constexpr std::array codecs{AV_CODEC_ID_PRORES, AV_CODEC_ID_DNXHD, AV_CODEC_ID_CFHD,
+                              AV_CODEC_ID_HQX,    AV_CODEC_ID_V210,  AV_CODEC_ID_JPEG2000};
+  return std::find(codecs.begin(), codecs.end(), codec) != codecs.end();
+}
+
 bool names_software_encoder(std::span<const std::uint8_t> bytes) {
   using namespace std::string_view_literals;
   constexpr std::array names{"x264 - core"sv, "x265 (build"sv, "Lavc"sv};

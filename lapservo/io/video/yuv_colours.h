@@ -10,6 +10,10 @@
 
 namespace lapservo::internal {
 
+/// Whether recorders and editors write it, rather than programs that encode RGB: ProRes, DNxHD, CineForm, Canopus HQX,
+/// uncompressed 4:2:2 of 10 bits, JPEG 2000.
+bool is_codec_of_recorders(AVCodecID codec);
+
 /// Whether the first bytes of a stream name x264, x265 or an encoder of libavcodec.
 bool names_software_encoder(std::span<const std::uint8_t> bytes);
 
