@@ -14,6 +14,7 @@
 #include "lapservo/core/error.h"
 #include "lapservo/io/image_file.h"
 #include "lapservo/io/pictures/picture_order.h"
+#include "lapservo/io/pictures/png_picture.h"
 #include "lapservo/io/video/video_reader.h"
 
 namespace lapservo {
@@ -26,8 +27,19 @@ struct Pictures {
   int unread = 0;  ///< beside them, of formats that are not read
 };
 
-std::string remark_on(const Pictures& pictures, const std::vector<fs::path>& files) {
+// The first file's; a folder's are alike.
+std::optional<Transfer> transfer_in(const std::vector<fs::path>& files) {
+  std::vector<std::uint8_t> head(std::size_t{1} << 16);
+  std::ifstream file(files.front(), std::ios::binary);
+  file.read(reinterpret_cast<char*>(head.data()), static_cast<std::streamsize>(head.size()));
+  head.resize(static_cast<std::size_t>(file.gcount()));
+  return png_transfer(head);
+}
+
+std::string remark_on(const Pictures& pictures, const std::vector<fs::path>& files,
+                      const std::optional<Transfer>& transfer) {
   std::vector<std::string> remarks;
+  if (transfer) remarks.push_back(remark_on_transfer(*transfer));
   if (pictures.unread > 0)
     remarks.push_back(
         fmt::format("{} images in HEIC, AVIF or DICOM are left out: convert them to PNG", pictures.unread));
@@ -41,7 +53,11 @@ std::string remark_on(const Pictures& pictures, const std::vector<fs::path>& fil
 class PictureSource : public FrameSource {
  public:
   PictureSource(Kind kind, Pictures pictures, double fps)
-      : kind_(kind), files_(std::move(pictures.order.files)), remark_(remark_on(pictures, files_)), fps_(fps) {}
+      : kind_(kind),
+        files_(std::move(pictures.order.files)),
+        transfer_(transfer_in(files_)),
+        remark_(remark_on(pictures, files_, transfer_)),
+        fps_(fps) {}
 
   std::optional<Frame> next() override {
     if (next_ == files_.size()) return std::nullopt;
@@ -53,6 +69,7 @@ class PictureSource : public FrameSource {
     return frame;
   }
   std::string remark() const override { return remark_; }
+  bool is_srgb() const override { return transfer_.has_value(); }
   std::string complaint() const override {
     if (low_bits_ == 0 || low_bits_ < next_) return "";
     return "has 16 bits a channel of which at most the lower 12 are used: multiply the values by 16 where the camera "
@@ -65,6 +82,7 @@ class PictureSource : public FrameSource {
  private:
   Kind kind_;
   std::vector<fs::path> files_;
+  std::optional<Transfer> transfer_;
   std::string remark_;
   double fps_;
   std::size_t next_ = 0, low_bits_ = 0;
@@ -92,6 +110,7 @@ class VideoSource : public FrameSource {
   std::optional<int> frame_count() const override { return video_.frame_count(); }
   double frames_per_second() const override { return video_.frames_per_second(); }
   std::string remark() const override { return video_.remark(); }
+  bool is_srgb() const override { return video_.is_srgb(); }
   std::string complaint() const override { return video_.complaint(); }
 
  private:
@@ -121,6 +140,7 @@ class StreamSource : public FrameSource {
   std::optional<int> frame_count() const override { return std::nullopt; }
   double frames_per_second() const override { return stream_.frames_per_second(); }
   std::string remark() const override { return stream_.remark(); }
+  bool is_srgb() const override { return stream_.is_srgb(); }
 
  private:
   VideoReader stream_;

@@ -32,10 +32,11 @@ struct Picture {
   bool low_bits = false;  ///< 16 bits a channel, of which the values use no more than the lower 12
 };
 
-/// Decodes an image. Grey is repeated over the channels, alpha dropped, 16-bit rounded to 8. Throws InputError for
-/// anything that isn't a whole image of the camera's pixels: empty, larger than 256 MiB, truncated (PNG without its
-/// end chunk), not decodable, of several images, HEIC, CMYK, other pixel types, or to be
-/// turned by EXIF, as a calibration belongs to the pixels in one orientation and it is unknown to which.
+/// Decodes an image. Light that a PNG names by cICP or gAMA is read as sRGB; grey is repeated over the channels, alpha
+/// dropped, 16-bit rounded to 8. Throws InputError for anything that isn't a whole image of the camera's pixels: empty,
+/// larger than 256 MiB, truncated (PNG without its end chunk), not decodable, of several images, HEIC, CMYK, other
+/// pixel types, or to be turned by EXIF, as a calibration belongs to the pixels in one orientation and it is unknown to
+/// which.
 Picture read_picture(const std::filesystem::path& path);
 Picture decode_picture(std::span<const std::uint8_t> bytes, const std::string& source);
 

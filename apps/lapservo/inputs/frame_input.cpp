@@ -17,6 +17,18 @@ void say_remark(const std::string& input, const std::string& remark) {
   if (!remark.empty()) std::fprintf(stderr, "lapservo: %s: %s\n", input.c_str(), remark.c_str());
 }
 
+namespace {
+
+// A response that was measured was measured with images that were read so.
+void expect_srgb(const std::string& input, const Response& response) {
+  if (response.kind == Response::Kind::srgb || response.sigma) return;
+  throw InputError(input,
+                   "names how it encodes light, which is read as sRGB, but the rig's response is another, "
+                   "expected srgb, or one that calibrate camera or colour measured");
+}
+
+}  // namespace
+
 std::unique_ptr<FrameSource> open_frames(const std::string& input, const FrameOptions& options, const Camera* camera) {
   if (is_bag(input)) {
     auto frames = std::make_unique<BagFrames>(open_bag(input), options.image_topic);
@@ -30,6 +42,7 @@ std::unique_ptr<FrameSource> open_frames(const std::string& input, const FrameOp
                              options.chroma_location};
   auto source = open_camera_or_file(input, options.fps, size, interrupted, reading);
   say_remark(input, source->remark());
+  if (source->is_srgb() && camera) expect_srgb(input, camera->response);
   return source->kind() == FrameSource::Kind::live ? std::move(source) : read_ahead(std::move(source));
 }
 

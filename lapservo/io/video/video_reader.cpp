@@ -109,6 +109,7 @@ class VideoReader::State {
   }
 
   const std::string& remark() const { return remark_; }
+  bool is_srgb() const { return is_srgb_; }
 
   std::string complaint() const {
     constexpr double slack = 0.01;  // durations are rounded
@@ -259,8 +260,10 @@ class VideoReader::State {
     return std::nullopt;
   }
 
-  void note_remarks() {
+  void note_remarks(const YuvColours& colours) {
+    is_srgb_ = colours.transfer.has_value();
     std::vector<std::string> remarks;
+    if (colours.transfer) remarks.push_back(remark_on_transfer(*colours.transfer));
     if (!given_.matrix) remarks.push_back(remark_on_matrix(*frame_, of_software_));
     if (has_assumed_rate())
       remarks.push_back(
@@ -286,9 +289,11 @@ class VideoReader::State {
       throw InputError(source_, "colour matrix", av_color_space_name(frame_->colorspace),
                        "bt709, smpte170m, bt470bg, bt2020nc, fcc or smpte240m (convert it: ffmpeg -i IN -vf "
                        "scale=out_color_matrix=bt709 -colorspace bt709 OUT)");
+    if (const std::string expected = expected_transfer(*frame_); !expected.empty())
+      throw InputError(source_, "transfer", av_color_transfer_name(frame_->color_trc), expected);
     if (!converter_.convert(*frame_, *colours, fields_, last_))
       throw InputError(source_, "has pixels of a kind that can't be converted, expected a video");
-    if (frames_ == 0) note_remarks();
+    if (frames_ == 0) note_remarks(*colours);
   }
 
   std::string source_;
@@ -302,6 +307,7 @@ class VideoReader::State {
   bool fields_;
   GivenColours given_;
   std::string remark_;
+  bool is_srgb_ = false;
   bool of_software_ = false;  // a software encoder wrote the stream
   BgrConverter converter_;
   AVStream* stream_ = nullptr;
@@ -332,6 +338,9 @@ double VideoReader::frames_per_second() const {
 }
 std::string VideoReader::remark() const {
   return state_->remark();
+}
+bool VideoReader::is_srgb() const {
+  return state_->is_srgb();
 }
 std::string VideoReader::complaint() const {
   return state_->complaint();
