@@ -41,8 +41,8 @@ std::unique_ptr<FrameSource> open_frames(const std::string& input, const FrameOp
   const VideoReading reading{options.deinterlace || (camera && camera->deinterlace), options.colour_matrix,
                              options.chroma_location};
   auto source = open_camera_or_file(input, options.fps, size, interrupted, reading);
-  say_remark(input, source->remark());
   if (source->is_srgb() && camera) expect_srgb(input, camera->response);
+  say_remark(input, source->remark());
   return source->kind() == FrameSource::Kind::live ? std::move(source) : read_ahead(std::move(source));
 }
 
