@@ -166,7 +166,7 @@ bool BgrConverter::convert(const AVFrame& frame, const YuvColours& colours, bool
               to.data(), to_steps.data());
   }
   if (to_planes) cv::merge(std::array{planes_[1], planes_[0], planes_[2]}, whole);
-  if (colours.transfer) bgr = srgb_of(deep, *colours.transfer);
+  if (colours.transfer) srgb_of(deep, *colours.transfer).copyTo(bgr);
   return true;
 }
 
