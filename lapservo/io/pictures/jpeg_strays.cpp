@@ -1,10 +1,10 @@
 #include "lapservo/io/pictures/jpeg_strays.h"
 
 #include <algorithm>
+#include <array>
 #include <csetjmp>
 #include <cstddef>
 #include <cstdio>
-#include <cstdlib>
 #include <jpeglib.h>
 
 #include "lapservo/io/pictures/jpeg_segments.h"
@@ -18,10 +18,33 @@ struct Rewriter {
   jpeg_decompress_struct in;
   jpeg_compress_struct out;
   jpeg_error_mgr errors;
+  jpeg_destination_mgr destination;
   std::jmp_buf leave;
-  unsigned char* bytes;  // malloc's
-  unsigned long size;
+  std::array<JOCTET, 4096> buffer;
+  std::vector<std::uint8_t>* bytes;
 };
+
+Rewriter& rewriter_of(j_compress_ptr out) {
+  return *static_cast<Rewriter*>(out->client_data);
+}
+
+void begin_buffer(j_compress_ptr out) {
+  out->dest->next_output_byte = rewriter_of(out).buffer.data();
+  out->dest->free_in_buffer = rewriter_of(out).buffer.size();
+}
+
+void keep_buffer(j_compress_ptr out) {
+  const auto& buffer = rewriter_of(out).buffer;
+  const auto used = static_cast<std::ptrdiff_t>(buffer.size() - out->dest->free_in_buffer);
+  rewriter_of(out).bytes->insert(rewriter_of(out).bytes->end(), buffer.begin(), buffer.begin() + used);
+}
+
+boolean on_full_buffer(j_compress_ptr out) {
+  out->dest->free_in_buffer = 0;
+  keep_buffer(out);
+  begin_buffer(out);
+  return TRUE;
+}
 
 void on_rewriting_error(j_common_ptr info) {
   std::longjmp(static_cast<Rewriter*>(info->client_data)->leave, 1);
@@ -49,7 +72,8 @@ bool rewrite(Rewriter& rewriter, Bytes jpeg) {
   jpeg_create_decompress(&in);
   jpeg_create_compress(&out);
   jpeg_mem_src(&in, jpeg.data(), jpeg.size());
-  jpeg_mem_dest(&out, &rewriter.bytes, &rewriter.size);
+  rewriter.destination = {nullptr, 0, begin_buffer, on_full_buffer, keep_buffer};
+  out.dest = &rewriter.destination;
   jpeg_read_header(&in, TRUE);
   if (jpeg_has_multiple_scans(&in)) return false;
   jvirt_barray_ptr* const coefficients = jpeg_read_coefficients(&in);
@@ -62,15 +86,15 @@ bool rewrite(Rewriter& rewriter, Bytes jpeg) {
   return true;
 }
 
+// Empty where that fails.
 std::vector<std::uint8_t> rewritten(Bytes jpeg) {
+  std::vector<std::uint8_t> bytes;
   Rewriter rewriter{};
+  rewriter.bytes = &bytes;
   const bool written = rewrite(rewriter, jpeg);
   jpeg_destroy_compress(&rewriter.out);
   jpeg_destroy_decompress(&rewriter.in);
-  std::vector<std::uint8_t> bytes;
-  if (written) bytes.assign(rewriter.bytes, rewriter.bytes + rewriter.size);
-  if (written) std::free(rewriter.bytes);  // else the library does not say whose they are
-  return bytes;
+  return written ? bytes : std::vector<std::uint8_t>();
 }
 
 // The data of the first scan, divided at restart markers.
