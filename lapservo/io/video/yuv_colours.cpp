@@ -87,10 +87,12 @@ std::string expected_transfer(const AVFrame& frame) {
     case AVCOL_TRC_SMPTE428:
       return "bt709 or another of cameras (convert it: ffmpeg -i IN -vf zscale=transfer=bt709 OUT)";
     case AVCOL_TRC_SMPTE2084:
-      return format && format->log2_chroma_w > 0 ? "bt709 or HLG, or chroma of full size (4:4:4): subsampled in PQ, it "
-                                                   "shifts boundaries of colours (set "
-                                                   "the recorder to SDR)"
-                                                 : "";
+    case AVCOL_TRC_LINEAR:
+      return format && format->log2_chroma_w + format->log2_chroma_h > 0
+                 ? "bt709 or HLG, or chroma of full size (4:4:4): subsampled in PQ or linear light, it "
+                   "shifts boundaries of colours (set "
+                   "the recorder to SDR)"
+                 : "";
     default:
       return "";
   }

@@ -36,8 +36,8 @@ GivenColours given_colours(const std::string& colour_matrix, const std::string& 
 std::optional<YuvColours> yuv_colours_of(const AVFrame& frame, AVCodecID codec, bool of_software,
                                          const GivenColours& given);
 
-/// The expectation in place of a transfer that is not undone: logarithms, that of cinemas, and PQ with fewer
-/// samples of chroma than of luma, which shift boundaries of colours. Empty for others.
+/// The expectation in place of a transfer that is not undone: logarithms, that of cinemas, and PQ and linear light with
+/// fewer samples of chroma than of luma, which shift boundaries of colours. Empty for others.
 std::string expected_transfer(const AVFrame& frame);
 
 /// How a frame without a matrix is read, in words, where players would read it otherwise than OpenCV or FFmpeg may have
