@@ -404,6 +404,45 @@ TEST_F(CommandLine, FlawedPicturesHaveAWordOfTheirOwn) {
   expect_done("track " + in("whole.jpg", whole) + " --rig configs/example.yaml --out out/obs.csv");
 }
 
+TEST_F(CommandLine, FlawedFramesAloneAreNamedAsTheCause) {
+  expect_done("render --rig configs/example.yaml --out out/frames --count 3 --format jpg");
+  fs::create_directory("in/damaged");
+  fs::create_directory("in/indexed");
+  for (int i = 0; i < 3; ++i) {
+    const std::string name = "000" + std::to_string(i);
+    const std::string whole = read_file("out/frames/" + name + ".jpg");
+    write_file("in/damaged/" + name + ".jpg", whole.substr(0, whole.size() / 2) + "\xff\xd9");
+    cv::imwrite("in/indexed/" + name + ".png",
+                cv::imread("out/frames/" + name + ".jpg") & cv::Scalar(0xc0, 0xc0, 0xc0));
+  }
+  empty_out();
+  for (const auto& [folder, said] : {std::pair{"in/damaged", "3 of 3 frames are damaged"},
+                                     {"in/indexed", "3 of 3 frames have no more colours than a palette"}}) {
+    const std::string recording = std::string(folder) + " --rig configs/example.yaml";
+    for (const char* command : {"check ", "calibrate marker ", "calibrate colour ", "calibrate registration "})
+      expect_refused(command + recording + " --out out/result", {folder, said});
+    EXPECT_EQ(run("track " + recording + " --out out/obs.csv"), 1);
+    expect_in(errors(), said);
+    empty_out();
+  }
+}
+
+TEST_F(CommandLine, AVideoThatNamesItsTransferIsReadByItUnlessTheRigSaysAnother) {
+  const std::string video = "in/a.mkv";
+  if (std::system(
+          ("ffmpeg -v quiet -f lavfi -i testsrc=s=1280x720 -frames:v 2 -c:v ffv1 -pix_fmt yuv444p10le -color_trc "
+           "arib-std-b67 -colorspace bt2020nc " +
+           video)
+              .c_str()) != 0)
+    GTEST_SKIP() << "no ffmpeg";
+  const std::string rig = read_file("configs/example.yaml");
+  expect_refused("track " + video + " --rig " + in("rec709.yaml", replaced(rig, "response: srgb", "response: rec709")) +
+                     " --out out/obs.csv",
+                 {video, "is read as sRGB", "expected srgb"});
+  EXPECT_EQ(run("track " + video + " --rig configs/example.yaml --out out/obs.csv"), 1);
+  expect_in(errors(), video + ": names HLG: its light is read as sRGB");
+}
+
 TEST_F(CommandLine, AVideoThatEndsEarlyIsMeasuredAndSaysSo) {
   expect_done("render --rig configs/example.yaml --out out/film --count 12 --moving");
   cv::VideoWriter video("in/a.mkv", cv::CAP_FFMPEG, cv::VideoWriter::fourcc('m', 'p', '4', 'v'), 25, {1280, 720});

@@ -41,11 +41,12 @@ std::array<char, 3> yuv_of(const Rgb& rgb, const Matrix& matrix, bool full_range
 }
 
 // An image's bytes in one of GStreamer's formats.
-std::string bars(const std::string& format, const Matrix& matrix, bool full_range) {
+std::string bars(const std::string& format, const Matrix& matrix, bool full_range,
+                 const std::array<Rgb, 4>& values = colours) {
   std::string light, u_plane, v_plane, uv_plane, packed;
   for (int row = 0; row < height; ++row) {
     for (int column = 0; column < width; column += 2) {
-      const auto [y, u, v] = yuv_of(colours[static_cast<std::size_t>(column / bar)], matrix, full_range);
+      const auto [y, u, v] = yuv_of(values[static_cast<std::size_t>(column / bar)], matrix, full_range);
       packed += {y, u, y, v};
       light += {y, y};
       if (row % 2 == 0) u_plane += u, v_plane += v, uv_plane += {u, v};
@@ -81,6 +82,29 @@ TEST(Colours, AreThoseOfTheCapsColorimetry) {
             EXPECT_NEAR(bgr[2 - static_cast<int>(channel)], colours[i][channel], 2) << pipeline << ", colour " << i;
         }
       }
+    }
+  }
+}
+
+// White, black and the colours' grey as HLG, PQ and linear light have them.
+TEST(Colours, AreLightAsTheCapsTransferSays) {
+  struct Transfer {
+    const char* number;  // GStreamer's
+    int white, grey;
+  };
+  for (const Transfer& transfer : {Transfer{"15", 191, 106}, {"14", 148, 109}, {"1", 255, 55}}) {
+    const std::array<Rgb, 4> values{Rgb{transfer.white, 0, 0},
+                                    {0, transfer.white, 0},
+                                    {0, 0, transfer.white},
+                                    {transfer.grey, transfer.grey, transfer.grey}};
+    const auto [pipeline, image] = shown(bars("i420", matrices[1], true, values), "i420", {width, height},
+                                         fmt::format("1:3:{}:1", transfer.number));
+    ASSERT_TRUE(image) << pipeline;
+    for (std::size_t i = 0; i < colours.size(); ++i) {
+      const auto bgr = image->bgr.at<cv::Vec3b>(height / 2, static_cast<int>(i) * bar + bar / 2);
+      for (std::size_t channel = 0; channel < 3; ++channel)
+        EXPECT_NEAR(bgr[2 - static_cast<int>(channel)], colours[i][channel], colours[i][channel] == 0 ? 25 : 6)
+            << pipeline << ", colour " << i;  // of black 8 bits of linear light hold little
     }
   }
 }

@@ -76,6 +76,19 @@ ChromaSite site_of(const GstVideoInfo& info, bool is_jpeg) {
   return packed || info.chroma_site == GST_VIDEO_CHROMA_SITE_UNKNOWN ? ChromaSite::left : ChromaSite::centre;
 }
 
+std::optional<Transfer> transfer_of(const GstVideoInfo& info) {
+  switch (info.colorimetry.transfer) {
+    case GST_VIDEO_TRANSFER_GAMMA10:
+      return Transfer{};
+    case GST_VIDEO_TRANSFER_ARIB_STD_B67:
+      return Transfer{Transfer::Kind::hlg};
+    case GST_VIDEO_TRANSFER_SMPTE2084:
+      return Transfer{Transfer::Kind::pq};
+    default:
+      return std::nullopt;  // as cameras encode light
+  }
+}
+
 YuvColours colours_of(const GstVideoInfo& info) {
   YuvColours colours;
   colours.full_range = info.colorimetry.range == GST_VIDEO_COLOR_RANGE_0_255;
@@ -97,6 +110,7 @@ YuvColours colours_of(const GstVideoInfo& info) {
       break;
   }
   colours.chroma = site_of(info, is_601 && colours.full_range);
+  colours.transfer = transfer_of(info);
   return colours;
 }
 

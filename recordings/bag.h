@@ -38,6 +38,8 @@ class Bag {
   /// As it was named.
   virtual const std::string& path() const = 0;
   virtual const std::vector<BagTopic>& topics() const = 0;
+  /// Which files beside it are not read and why; empty where there are none.
+  virtual std::string remark() const { return {}; }
   /// The messages of one of topics(). The bag must outlive it.
   virtual std::unique_ptr<BagMessages> messages(const BagTopic& topic) const = 0;
 };

@@ -15,15 +15,9 @@
 namespace lapservo::internal {
 namespace {
 
-struct StampedDecoded {
-  double stamp_s = 0;
-  DecodedImage image = BadImage{"no message of its type; message by message compressed bags want `ros2 bag convert`"};
-};
-
-StampedDecoded decoded(const BagMessage& message) {
-  if (const auto* raw = std::get_if<ImageMessage>(&message)) return {raw->stamp_s, decode(*raw)};
-  if (const auto* jpeg = std::get_if<CompressedImageMessage>(&message)) return {jpeg->stamp_s, decode(*jpeg)};
-  return {};
+DecodedImage decoded(const BagMessage& message) {
+  if (const auto* raw = std::get_if<ImageMessage>(&message)) return decode(*raw);
+  return decode(std::get<CompressedImageMessage>(message));
 }
 
 }  // namespace
@@ -32,34 +26,27 @@ BagFrames::BagFrames(std::shared_ptr<const Bag> bag, const std::string& topic)
     : bag_(std::move(bag)), topic_(image_topic_of(*bag_, topic)), messages_(bag_->messages(topic_)) {
   first_ = read();
   if (!first_)
-    throw InputError(bag_->path(), fmt::format("{}: none of {} images can be read: {}", topic_.name, left_out_, why_));
+    throw InputError(bag_->path(), fmt::format("{}: none of {} images can be read: {}", topic_.name,
+                                               messages_.left_out() + unreadable_, why()));
 }
 
-void BagFrames::leave_out(const std::string& why) {
-  if (left_out_++ == 0) why_ = why;
+const std::string& BagFrames::why() const {
+  return messages_.left_out() > 0 ? messages_.why() : why_unreadable_;
 }
 
 std::optional<BagFrames::Picture> BagFrames::read() {
-  while (const auto message = messages_->next()) {
-    StampedDecoded found = decoded(*message);
-    if (const auto* bad = std::get_if<BadImage>(&found.image)) {
-      leave_out(bad->why);
-    } else if (!(found.stamp_s > 0)) {
-      leave_out("no stamp");
-    } else if (!(found.stamp_s > last_stamp_s_)) {
-      leave_out("its stamp is not later than the one before");
-    } else {
-      last_stamp_s_ = found.stamp_s;
-      return Picture{found.stamp_s, std::move(std::get<cv::Mat>(found.image))};
-    }
+  while (const auto message = messages_.next()) {
+    DecodedImage image = decoded(message->message);
+    if (auto* bgr = std::get_if<cv::Mat>(&image)) return Picture{message->time_s, std::move(*bgr)};
+    if (unreadable_++ == 0) why_unreadable_ = std::get<BadImage>(image).why;
   }
   return std::nullopt;
 }
 
 std::optional<Frame> BagFrames::next() {
-  auto picture = index_ == 0 ? std::optional(Picture{first_->stamp_s, std::exchange(first_->bgr, {})}) : read();
+  auto picture = index_ == 0 ? std::optional(Picture{first_->time_s, std::exchange(first_->bgr, {})}) : read();
   if (!picture) return std::nullopt;
-  Frame frame{std::move(picture->bgr), index_++, picture->stamp_s - first_->stamp_s, {}, {}};
+  Frame frame{std::move(picture->bgr), index_++, picture->time_s - first_->time_s, {}, {}};
   if (has_few_colours(frame.bgr)) frame.flaw = Status::few_colours;
   return frame;
 }
@@ -75,8 +62,12 @@ double BagFrames::frames_per_second() const {
 }
 
 std::string BagFrames::complaint() const {
-  if (left_out_ == 0) return {};
-  return fmt::format("{}: {} of {} images are left out ({})", topic_.name, left_out_, left_out_ + index_, why_);
+  std::string text;
+  if (const int left_out = messages_.left_out() + unreadable_; left_out > 0)
+    text = fmt::format("{}: {} of {} images are left out ({})", topic_.name, left_out, left_out + index_, why());
+  if (messages_.steps() == 0) return text;
+  return fmt::format("{}{}the clock of {} was set {} times: times go on by the recorder's", text,
+                     text.empty() ? "" : "; ", topic_.name, messages_.steps());
 }
 
 }  // namespace lapservo::internal

@@ -6,11 +6,12 @@
 
 #include "lapservo/io/frame_source.h"
 #include "recordings/bag.h"
+#include "recordings/stamped_messages.h"
 
 namespace lapservo::internal {
 
-/// The images of a bag's topic as frames, with the times of their headers' stamps. Unreadable images, and images
-/// without a stamp or with one not later than the previous, are left out and reported in complaint().
+/// The images of a bag's topic as frames, with the times of their headers' stamps (stamped_messages.h). Unreadable
+/// images, and those that are left out for their stamps, are reported in complaint().
 class BagFrames : public FrameSource {
  public:
   /// `topic`: see image_topic_of(). Throws InputError when no image can be read.
@@ -20,25 +21,25 @@ class BagFrames : public FrameSource {
   Kind kind() const override { return Kind::video; }
   std::optional<int> frame_count() const override;
   double frames_per_second() const override;
+  std::string remark() const override { return bag_->remark(); }
   std::string complaint() const override;
   const std::string& topic() const { return topic_.name; }
-  std::optional<double> first_stamp_s() const override { return first_->stamp_s; }
+  std::optional<double> first_stamp_s() const override { return first_->time_s; }
 
  private:
   struct Picture {
-    double stamp_s = 0;
+    double time_s = 0;
     cv::Mat bgr;
   };
   std::optional<Picture> read();
-  void leave_out(const std::string& why);
+  const std::string& why() const;
 
   std::shared_ptr<const Bag> bag_;
   BagTopic topic_;
-  std::unique_ptr<BagMessages> messages_;
+  StampedMessages messages_;
   std::optional<Picture> first_;
-  double last_stamp_s_ = 0;
-  int index_ = 0, left_out_ = 0;
-  std::string why_;  // the first was
+  int index_ = 0, unreadable_ = 0;
+  std::string why_unreadable_;  // the first was
 };
 
 }  // namespace lapservo::internal

@@ -70,6 +70,29 @@ TEST(BagFrames, LeaveOutWhatIsNoFrameAndSayIt) {
   EXPECT_EQ(frames->complaint(), "/image: 4 of 6 images are left out (no stamp)");
 }
 
+TEST(BagFrames, OfAClockThatIsSetAndOfAStampThatStandsOutAreCountedAndSaid) {
+  std::vector<ImageMessage> ahead, set_back;
+  for (int i = 0; i < 20; ++i) {
+    ahead.push_back(image_at(1000 + 0.1 * i + (i == 5 ? 3600 : 0)));
+    set_back.push_back(image_at(5000 + 0.1 * i - (i < 10 ? 0 : 3600)));
+  }
+  const auto times_of = [](BagFrames& frames) {
+    std::vector<double> times_s;
+    while (const auto frame = frames.next()) times_s.push_back(frame->time_s);
+    return times_s;
+  };
+  const BagOfImages bag_ahead(ahead), bag_set_back(set_back);
+  const auto frames_ahead = bag_ahead.open(), frames_set_back = bag_set_back.open();
+  const auto times_ahead = times_of(*frames_ahead), times_set_back = times_of(*frames_set_back);
+  ASSERT_EQ(times_ahead.size(), 19U);
+  EXPECT_NEAR(times_ahead.back(), 1.9, 1e-6);
+  EXPECT_EQ(frames_ahead->complaint(),
+            "/image: 1 of 20 images are left out (its stamp is 3600.0 s from those around it)");
+  ASSERT_EQ(times_set_back.size(), 20U);
+  for (int i = 0; i < 20; ++i) EXPECT_NEAR(times_set_back[static_cast<std::size_t>(i)], 0.1 * i, 1e-6);
+  EXPECT_EQ(frames_set_back->complaint(), "the clock of /image was set 1 times: times go on by the recorder's");
+}
+
 TEST(BagFrames, WithoutAnyThatCanBeReadAreRefused) {
   const BagOfImages bag({image_at(100, "mono8"), image_at(101, "mono8")});
   const std::string error = input_error([&] { bag.open(); });
@@ -82,7 +105,8 @@ class BagOfJoints {
   explicit BagOfJoints(const std::vector<JointMessage>& readings) {
     std::vector<BagEntry> entries;
     for (const JointMessage& reading : readings)
-      entries.push_back({"/PSM1/measured_js", joint_type, 50, testing::ros1_bytes(reading)});
+      entries.push_back({"/PSM1/measured_js", joint_type, 50 + 0.02 * static_cast<double>(entries.size()),
+                         testing::ros1_bytes(reading)});
     testing::write_ros1_bag(folder_ / "run.bag", entries);
     bag_ = open_bag(folder_ / "run.bag");
   }
@@ -120,6 +144,22 @@ TEST(BagJoints, OfAnotherArmOnTheSameTopicArePassedOver) {
   EXPECT_EQ(recording.of_other_arms, 2);
 }
 
+TEST(BagJoints, ThatArePassedOverAreCountedAndSaid) {
+  const std::vector<std::string> names{"a", "b", "c", "d"};
+  std::vector<JointMessage> readings;
+  for (int i = 0; i < 40; ++i)
+    readings.push_back({100 + 0.02 * i + (i == 7 ? 3600 : 0), names, {1, 2, i == 9 ? NAN : 3, 0.4}});
+  const JointRecording ahead = BagOfJoints(readings).read();
+  EXPECT_EQ(ahead.time_s.size(), 38U);
+  EXPECT_EQ(ahead.remark(),
+            "passed over: 1 readings without a stamp that goes with the others', 1 readings that are no numbers");
+  for (int i = 20; i < 40; ++i) readings[static_cast<std::size_t>(i)].stamp_s -= 50;
+  const JointRecording set_back = BagOfJoints(readings).read();
+  EXPECT_EQ(set_back.time_s.size(), 38U);
+  EXPECT_EQ(set_back.steps, 1);
+  EXPECT_NE(set_back.remark().find("the clock of the joints was set 1 times"), std::string::npos);
+}
+
 TEST(BagJoints, ThatCanNotBeUsedAreRefused) {
   constexpr double since_1970_s = 1.7e9;
   const std::vector<std::string> names{"a", "b", "c", "d"};
@@ -128,6 +168,8 @@ TEST(BagJoints, ThatCanNotBeUsedAreRefused) {
        "the images are stamped by the time since a computer's start"},
       {{{100, {"a", "b", "c"}, {1, 2, 3}}},
        "/PSM1/measured_js: has no positions of the rig's joints b, a, d, c: it names a, b, c"},
+      {{{100, names, {1, 2, 3, 0.4}}, {101, {"a", "b", "c", "d", "b"}, {1, 2, 3, 0.4, 5}}},
+       "/PSM1/measured_js: names the joint b twice in a message, expected each name once"},
       {{{100, names, {1, 2, 3}}}, "has no positions of the rig's joints"},
       {{{100, names, {1, 2, 3, 0.4}}}, "has 1 readings"}};
   for (const auto& [readings, said] : cases) {

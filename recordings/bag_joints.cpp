@@ -10,12 +10,17 @@
 #include <fmt/ranges.h>
 
 #include "lapservo/core/error.h"
+#include "lapservo/crtk/joint_map.h"
+#include "recordings/stamped_messages.h"
 
 namespace lapservo::internal {
 namespace {
 
 // Nullopt where the message lacks one of them: several arms may share a topic.
-std::optional<std::array<double, 4>> chosen(const JointMessage& message, const Joints& joints) {
+std::optional<std::array<double, 4>> chosen(const JointMessage& message, const Joints& joints,
+                                            const std::string& source) {
+  if (const std::string twice = repeated_joint(joints, message.names); !twice.empty())
+    throw InputError(source, fmt::format("names the joint {} twice in a message, expected each name once", twice));
   std::array<double, 4> values{};
   for (std::size_t i = 0; i < values.size(); ++i) {
     const auto found = std::find(message.names.begin(), message.names.end(), joints.names[i]);
@@ -42,19 +47,13 @@ void check_clock(const JointRecording& recording, double begin_s, const std::str
 // The lead of a topic's stamps over the recorder's clock.
 double lead_s(const Bag& bag, const BagTopic& topic) {
   constexpr int enough = 60;
-  const auto messages = bag.messages(topic);
+  StampedMessages messages(bag.messages(topic));
   std::optional<double> lead_s;
   for (int i = 0; i < enough; ++i) {
-    const auto message = messages->next();
+    const auto message = messages.next();
     if (!message) break;
-    const double stamp_s = std::visit(
-        [](const auto& m) {
-          if constexpr (requires { m.stamp_s; }) return m.stamp_s;
-          return 0.0;
-        },
-        *message);
-    if (stamp_s > 0)
-      lead_s = std::max(lead_s.value_or(stamp_s - messages->recorded_s()), stamp_s - messages->recorded_s());
+    const double of_message_s = message->time_s - message->recorded_s;
+    lead_s = std::max(lead_s.value_or(of_message_s), of_message_s);
   }
   return lead_s.value_or(0);
 }
@@ -74,26 +73,27 @@ std::vector<std::string> joint_names_in_bag(const Bag& bag, const BagTopic& topi
 
 JointRecording joints_in_bag(const Bag& bag, const BagTopic& topic, const Joints& joints, double begin_s) {
   const std::string source = bag.path() + ": " + topic.name;
-  const auto messages = bag.messages(topic);
   JointRecording recording;
   std::vector<std::string> other_names;  // of the latest message of another arm
-  while (const auto message = messages->next()) {
-    const auto* reading = std::get_if<JointMessage>(&*message);
-    if (!reading || !(reading->stamp_s > 0)) continue;
-    const auto values = chosen(*reading, joints);
-    if (!values) {
-      ++recording.of_other_arms;
-      other_names = reading->names;
-      continue;
+  StampedMessages messages(bag.messages(topic), [&](const BagMessage& message) {
+    const auto* reading = std::get_if<JointMessage>(&message);
+    if (!reading || chosen(*reading, joints, source)) return true;
+    ++recording.of_other_arms;
+    other_names = reading->names;
+    return false;
+  });
+  while (const auto message = messages.next()) {
+    const auto values = *chosen(std::get<JointMessage>(message->message), joints, source);
+    if (std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); })) {
+      recording.time_s.push_back(message->time_s - begin_s);
+      recording.joints.push_back(values);
+    } else {
+      ++recording.no_numbers;
     }
-    const double time_s = reading->stamp_s - begin_s;
-    const bool later = recording.time_s.empty() || time_s > recording.time_s.back();
-    recording.repeated += !recording.time_s.empty() && time_s == recording.time_s.back();
-    if (!later || !std::all_of(values->begin(), values->end(), [](double value) { return std::isfinite(value); }))
-      continue;
-    recording.time_s.push_back(time_s);
-    recording.joints.push_back(*values);
   }
+  recording.repeated = messages.repeated();
+  recording.left_out = messages.left_out() - messages.repeated();
+  recording.steps = messages.steps();
   if (recording.time_s.empty() && recording.of_other_arms > 0)
     throw InputError(source, fmt::format("has no positions of the rig's joints {}: it names {}",
                                          fmt::join(joints.names, ", "), fmt::join(other_names, ", ")));

@@ -8,6 +8,7 @@
 #include <system_error>
 
 #include "lapservo/core/error.h"
+#include "recordings/bag_endings.h"
 #ifdef LAPSERVO_ROS1_BAGS
 #include "recordings/ros1_bag.h"
 #endif
@@ -20,10 +21,6 @@ namespace fs = std::filesystem;
 namespace {
 
 enum class BagKind { none, ros1, ros2, mcap, compressed };
-
-bool ends_like(const std::string& path, std::initializer_list<std::string_view> ends) {
-  return std::any_of(ends.begin(), ends.end(), [&](std::string_view end) { return path.ends_with(end); });
-}
 
 BagKind kind_of_file(const std::string& path) {
   std::array<char, 16> begin{};
@@ -42,7 +39,7 @@ BagKind kind_of_file(const std::string& path) {
 BagKind kind_of_folder(const std::string& path) {
   std::error_code error;
   for (fs::directory_iterator entry(path, error), end; !error && entry != end; entry.increment(error))
-    if (ends_like(entry->path().string(), {".db3", ".mcap", ".db3.zstd", ".mcap.zstd"})) return BagKind::ros2;
+    if (ends_like_ros2_bag(entry->path().string())) return BagKind::ros2;
   return BagKind::none;
 }
 

@@ -103,6 +103,25 @@ TEST(OpenBag, ReadsRos2sFilesAndFolders) {
   testing::write_ros2_metadata(split, {"bag_9.db3", "split/bag_10.db3"});
   ASSERT_TRUE(is_bag(split));
   expect_entries(*open_bag(split));
+  EXPECT_EQ(open_bag(split)->remark(), "");
+}
+
+TEST(OpenBag, SaysWhichFilesOfAFolderItsMetadataDoesNotList) {
+  const testing::TemporaryFolder folder;
+  for (const char* name : {"bag_0.db3", "bag_1.db3", "bag_2.db3"})
+    testing::write_ros2_bag(folder / name, entries(as_ros2));
+  testing::write_file(folder / "bag_3.db3.zstd", "packed");
+  testing::write_file(folder / "bag_0.db3-wal", "");
+  testing::write_ros2_metadata(folder.path(), {"bag_0.db3"});
+  EXPECT_EQ(open_bag(folder.path())->remark(),
+            "metadata.yaml does not list bag_1.db3, bag_2.db3, bag_3.db3.zstd: not read; `ros2 bag reindex` lists all "
+            "files");
+  EXPECT_EQ(open_bag(folder / "bag_1.db3")->remark(), "");
+  testing::write_ros2_metadata(folder.path(), {"bag_0.db3", "bag_1.db3", "bag_0.db3"});
+  EXPECT_NE(input_error([&] {
+              open_bag(folder.path());
+            }).find("metadata.yaml: relative_file_paths: is bag_0.db3, expected each file once"),
+            std::string::npos);
 }
 
 TEST(OpenBag, RefusesInOneLineWhatItCannotRead) {

@@ -39,6 +39,7 @@ class ReplayedRun {
   /// By how much the arm's clock is ahead of the camera's; its joints are shifted by that.
   double arm_clock_lead_s() const { return joints_.lead_s; }
   std::string complaint() const { return frames_.complaint(); }
+  std::string joint_remark() const { return joints_.recording.remark(); }
 
  private:
   struct RecordedClock : Clock {

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "lapservo/core/error.h"
 #include "recordings/ros2_metadata.h"
@@ -56,12 +57,22 @@ std::string type_as_in_ros1(std::string type) {
   return type;
 }
 
+std::string remark_on(const std::vector<fs::path>& unlisted) {
+  if (unlisted.empty()) return {};
+  std::vector<std::string> names;
+  for (const fs::path& file : unlisted) names.push_back(file.filename().string());
+  return fmt::format("metadata.yaml does not list {}: not read; `ros2 bag reindex` lists all files",
+                     fmt::join(names, ", "));
+}
+
 class Ros2Bag : public Bag {
  public:
   explicit Ros2Bag(const std::string& path) : path_(path) {
     std::error_code error;
     if (fs::is_directory(path, error)) {
-      for (const fs::path& file : files_of_ros2_bag(path)) add(file.string());
+      const auto [listed, unlisted] = files_of_ros2_bag(path);
+      for (const fs::path& file : listed) add(file.string());
+      remark_ = remark_on(unlisted);
     } else {
       add(path);
     }
@@ -74,6 +85,7 @@ class Ros2Bag : public Bag {
 
   const std::string& path() const override { return path_; }
   const std::vector<BagTopic>& topics() const override { return topics_; }
+  std::string remark() const override { return remark_; }
   std::unique_ptr<BagMessages> messages(const BagTopic& topic) const override {
     return std::make_unique<Ros2Messages>(parts_, topic);
   }
@@ -116,7 +128,7 @@ class Ros2Bag : public Bag {
         }
   }
 
-  std::string path_;
+  std::string path_, remark_;
   std::vector<Part> parts_;
   std::map<std::pair<std::string, std::string>, Counted> counts_;
   std::vector<BagTopic> topics_;

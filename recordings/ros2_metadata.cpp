@@ -1,11 +1,13 @@
 #include "recordings/ros2_metadata.h"
 
+#include <algorithm>
 #include <string>
 #include <system_error>
 
 #include <yaml-cpp/yaml.h>
 
 #include "lapservo/core/error.h"
+#include "recordings/bag_endings.h"
 
 namespace lapservo::internal {
 namespace fs = std::filesystem;
@@ -25,6 +27,8 @@ std::vector<fs::path> files_in(const YAML::Node& information, const fs::path& fo
   std::vector<fs::path> files;
   for (const YAML::Node& file : information["relative_file_paths"]) {
     files.push_back(folder / fs::path(file.as<std::string>()).filename());  // some say it with the folder's name
+    if (std::find(files.begin(), files.end() - 1, files.back()) != files.end() - 1)
+      throw InputError(source, "relative_file_paths", files.back().filename().string(), "each file once");
     std::error_code error;
     if (!fs::is_regular_file(files.back(), error))
       throw InputError(files.back().string(), "does not exist, though " + source + " names it: copy the whole folder");
@@ -33,9 +37,20 @@ std::vector<fs::path> files_in(const YAML::Node& information, const fs::path& fo
   return files;
 }
 
+std::vector<fs::path> unlisted_in(const fs::path& folder, const std::vector<fs::path>& listed) {
+  std::vector<fs::path> files;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error))
+    if (ends_like_ros2_bag(entry->path().string()) &&
+        std::find(listed.begin(), listed.end(), entry->path()) == listed.end())
+      files.push_back(entry->path());
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
 }  // namespace
 
-std::vector<fs::path> files_of_ros2_bag(const fs::path& folder) {
+Ros2BagFiles files_of_ros2_bag(const fs::path& folder) {
   const fs::path metadata = folder / "metadata.yaml";
   std::error_code error;
   if (!fs::exists(metadata, error))
@@ -43,7 +58,10 @@ std::vector<fs::path> files_of_ros2_bag(const fs::path& folder) {
                      "has no metadata.yaml, expected a ROS 2 bag's: name one of its .db3, or make it with `ros2 bag "
                      "reindex`");
   try {
-    return files_in(YAML::LoadFile(metadata.string())["rosbag2_bagfile_information"], folder, metadata.string());
+    Ros2BagFiles files{
+        files_in(YAML::LoadFile(metadata.string())["rosbag2_bagfile_information"], folder, metadata.string()), {}};
+    files.unlisted = unlisted_in(folder, files.listed);
+    return files;
   } catch (const YAML::Exception& problem) {
     throw InputError(metadata.string(),
                      std::string("can't be read (") + problem.msg + "), expected a ROS 2 bag's YAML");

@@ -5,8 +5,13 @@
 
 namespace lapservo::internal {
 
-/// The .db3 files of a ROS 2 bag's folder, in the order of its metadata.yaml. Throws InputError for what is compressed,
-/// of another storage than sqlite3, or not there.
-std::vector<std::filesystem::path> files_of_ros2_bag(const std::filesystem::path& folder);
+struct Ros2BagFiles {
+  std::vector<std::filesystem::path> listed;    ///< in the order of metadata.yaml
+  std::vector<std::filesystem::path> unlisted;  ///< others that lie there, by name
+};
+
+/// The files of a ROS 2 bag's folder. Throws InputError for what is compressed, of another storage than sqlite3, listed
+/// twice or not there.
+Ros2BagFiles files_of_ros2_bag(const std::filesystem::path& folder);
 
 }  // namespace lapservo::internal

@@ -149,6 +149,8 @@ std::size_t CsvTable::index_of(std::string_view column) const {
   const auto found = std::find(header_.begin(), header_.end(), column);
   if (found == header_.end())
     throw InputError(source_, "has no column '" + std::string(column) + "', expected one beside " + names(header_));
+  if (std::find(found + 1, header_.end(), column) != header_.end())
+    throw InputError(source_, "has several columns '" + std::string(column) + "', expected one");
   return static_cast<std::size_t>(found - header_.begin());
 }
 

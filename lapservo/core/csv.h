@@ -21,7 +21,7 @@ class CsvTable {
   std::size_t rows() const { return rows_.size(); }
   const std::vector<std::string>& columns() const { return header_; }
   bool has(std::string_view column) const;
-  /// Throws InputError when there is no such column.
+  /// Throws InputError when there is no such column, or more than one.
   const std::string& text(std::size_t row, std::string_view column) const;
   /// Empty field: nullopt. Anything but a finite number: InputError.
   std::optional<double> number_or_empty(std::size_t row, std::string_view column) const;

@@ -115,6 +115,13 @@ TEST(CsvTable, ComplaintsNameFileLineColumnValueAndExpectation) {
   EXPECT_EQ(input_error([&] { table.text(0, "c"); }), "t.csv: has no column 'c', expected one beside a,b");
 }
 
+TEST(CsvTable, AColumnThatStandsThereTwiceIsRefusedWhenItIsAskedFor) {
+  const CsvTable table = CsvTable::parse("a,b,note,b,note,,\n1,2,x,3,y,,\n", "t.csv");
+  EXPECT_EQ(table.number(0, "a"), 1);
+  EXPECT_EQ(input_error([&] { table.number(0, "b"); }), "t.csv: has several columns 'b', expected one");
+  EXPECT_EQ(input_error([&] { table.text(0, "note"); }), "t.csv: has several columns 'note', expected one");
+}
+
 TEST(CsvTable, AComplaintIsOnePrintableLineWhateverTheFieldHolds) {
   const CsvTable table = CsvTable::parse("a\n\x1b[31m\v" + std::string(500, 'x') + "\n", "t.csv");
   const std::string error = input_error([&] { table.number(0, "a"); });

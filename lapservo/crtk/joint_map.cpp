@@ -20,6 +20,13 @@ std::optional<Names> other_names(const Joints& joints) {
   return std::nullopt;
 }
 
+std::string repeated_of(const Names& wanted, const std::vector<std::string>& names) {
+  const auto found = std::find_if(wanted.begin(), wanted.end(), [&](const std::string& name) {
+    return std::count(names.begin(), names.end(), name) > 1;
+  });
+  return found == wanted.end() ? "" : *found;
+}
+
 std::optional<std::array<std::size_t, 4>> find_names(const Names& wanted, const std::vector<std::string>& names) {
   std::array<std::size_t, 4> places{};
   for (std::size_t i = 0; i < places.size(); ++i) {
@@ -53,7 +60,15 @@ std::optional<std::array<std::size_t, 4>> find_joints(const Joints& joints, cons
   return other ? find_names(*other, names) : std::nullopt;
 }
 
+std::string repeated_joint(const Joints& joints, const std::vector<std::string>& names) {
+  const std::string repeated = repeated_of(joints.names, names);
+  const auto other = other_names(joints);
+  return repeated.empty() && other ? repeated_of(*other, names) : repeated;
+}
+
 std::string unfit_joints(const Joints& joints, const std::vector<std::string>& names) {
+  if (const std::string twice = repeated_joint(joints, names); !twice.empty())
+    return fmt::format("joints are {}: {} stands there twice, expected each name once", fmt::join(names, ", "), twice);
   const auto other = other_names(joints);
   return fmt::format("joints are {}, expected {}{}{}", fmt::join(names, ", "), fmt::join(joints.names, ", "),
                      other ? fmt::format(" or {}", fmt::join(*other, ", ")) : "",

@@ -19,6 +19,9 @@ JointLimits limits_of_q(const Joints& joints, const JointLimits& limits);
 /// are those of a PSM without an instrument.
 std::optional<std::array<std::size_t, 4>> find_joints(const Joints& joints, const std::vector<std::string>& names);
 
+/// The first of the rig's joints, by either of a PSM's names, that stands in a message twice; empty where none does.
+std::string repeated_joint(const Joints& joints, const std::vector<std::string>& names);
+
 /// Why it finds none: the names that came and those that are expected.
 std::string unfit_joints(const Joints& joints, const std::vector<std::string>& names);
 

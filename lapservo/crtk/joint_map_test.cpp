@@ -86,6 +86,11 @@ TEST(JointMap, FindsTheFourAmongOthersAndRefusesMissingAndRepeatedOnes) {
   EXPECT_FALSE(find_joints(psm(), {"outer_yaw", "outer_pitch", "outer_insertion"}));
   EXPECT_FALSE(find_joints(psm(), {"outer_yaw", "outer_pitch", "outer_insertion", "outer_roll", "outer_yaw"}));
   EXPECT_FALSE(find_joints(psm(), {}));
+  EXPECT_EQ(unfit_joints(psm(), {"outer_yaw", "outer_pitch", "outer_insertion", "outer_roll", "outer_yaw"}),
+            "joints are outer_yaw, outer_pitch, outer_insertion, outer_roll, outer_yaw: outer_yaw stands there twice, "
+            "expected each name once");
+  EXPECT_EQ(repeated_joint(psm(), {"yaw", "pitch", "pitch", "insertion", "roll"}), "pitch");
+  EXPECT_EQ(repeated_joint(psm(), {"wrist", "outer_yaw", "wrist"}), "");
 }
 
 TEST(JointMap, KnowsADvrksNamesOfBothTimes) {

@@ -4,8 +4,8 @@
 
 namespace lapservo::internal {
 
-/// Angle between the optical axis and the ray through the image's farthest corner. A lens's distortion is known, and
-/// can be inverted, up to there.
+/// Angle between the optical axis and the ray through the image's farthest corner, or through the farthest pixel
+/// towards it that the distortion does not fold. A lens's distortion is known, and can be inverted, up to there.
 double half_field_rad(const Camera& camera);
 
 }  // namespace lapservo::internal

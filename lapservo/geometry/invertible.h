@@ -4,7 +4,11 @@
 
 namespace lapservo::internal {
 
-/// Whether every pixel has a ray: distortion that was measured in the middle only may fold at the image's border.
+/// Whether every pixel of the largest circle amid the image has a ray. Endoscopes show hardly more than a circle,
+/// outside of which their distortion was not measured and may fold.
 bool is_invertible(const Camera& camera);
+
+/// Whether every pixel of the image has a ray.
+bool is_invertible_everywhere(const Camera& camera);
 
 }  // namespace lapservo::internal

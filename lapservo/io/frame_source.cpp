@@ -1,15 +1,20 @@
 #include "lapservo/io/frame_source.h"
 
-#include <algorithm>
+#include <array>
 #include <chrono>
+#include <fstream>
+#include <string_view>
 #include <system_error>
 #include <utility>
 #include <vector>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "lapservo/core/error.h"
 #include "lapservo/io/image_file.h"
+#include "lapservo/io/pictures/picture_order.h"
+#include "lapservo/io/pictures/png_picture.h"
 #include "lapservo/io/video/video_reader.h"
 
 namespace lapservo {
@@ -18,14 +23,41 @@ namespace {
 namespace fs = std::filesystem;
 
 struct Pictures {
-  std::vector<fs::path> files;
+  PictureOrder order;
   int unread = 0;  ///< beside them, of formats that are not read
 };
+
+// The first file's; a folder's are alike.
+std::optional<Transfer> transfer_in(const std::vector<fs::path>& files) {
+  std::vector<std::uint8_t> head(std::size_t{1} << 16);
+  std::ifstream file(files.front(), std::ios::binary);
+  file.read(reinterpret_cast<char*>(head.data()), static_cast<std::streamsize>(head.size()));
+  head.resize(static_cast<std::size_t>(file.gcount()));
+  return png_transfer(head);
+}
+
+std::string remark_on(const Pictures& pictures, const std::vector<fs::path>& files,
+                      const std::optional<Transfer>& transfer) {
+  std::vector<std::string> remarks;
+  if (transfer) remarks.push_back(remark_on_transfer(*transfer));
+  if (pictures.unread > 0)
+    remarks.push_back(
+        fmt::format("{} images in HEIC, AVIF or DICOM are left out: convert them to PNG", pictures.unread));
+  if (pictures.order.is_ambiguous)
+    remarks.push_back(fmt::format("points and signs of the numbers in the names decide the order: {}, {} ... {}",
+                                  files[0].filename().string(), files[1].filename().string(),
+                                  files.back().filename().string()));
+  return fmt::format("{}", fmt::join(remarks, "; "));
+}
 
 class PictureSource : public FrameSource {
  public:
   PictureSource(Kind kind, Pictures pictures, double fps)
-      : kind_(kind), files_(std::move(pictures.files)), unread_(pictures.unread), fps_(fps) {}
+      : kind_(kind),
+        files_(std::move(pictures.order.files)),
+        transfer_(transfer_in(files_)),
+        remark_(remark_on(pictures, files_, transfer_)),
+        fps_(fps) {}
 
   std::optional<Frame> next() override {
     if (next_ == files_.size()) return std::nullopt;
@@ -36,9 +68,8 @@ class PictureSource : public FrameSource {
     low_bits_ += picture.low_bits;
     return frame;
   }
-  std::string remark() const override {
-    return unread_ == 0 ? "" : fmt::format("{} images in HEIC or AVIF are left out: convert them to PNG", unread_);
-  }
+  std::string remark() const override { return remark_; }
+  bool is_srgb() const override { return transfer_.has_value(); }
   std::string complaint() const override {
     if (low_bits_ == 0 || low_bits_ < next_) return "";
     return "has 16 bits a channel of which at most the lower 12 are used: multiply the values by 16 where the camera "
@@ -51,7 +82,8 @@ class PictureSource : public FrameSource {
  private:
   Kind kind_;
   std::vector<fs::path> files_;
-  int unread_;
+  std::optional<Transfer> transfer_;
+  std::string remark_;
   double fps_;
   std::size_t next_ = 0, low_bits_ = 0;
 };
@@ -78,6 +110,7 @@ class VideoSource : public FrameSource {
   std::optional<int> frame_count() const override { return video_.frame_count(); }
   double frames_per_second() const override { return video_.frames_per_second(); }
   std::string remark() const override { return video_.remark(); }
+  bool is_srgb() const override { return video_.is_srgb(); }
   std::string complaint() const override { return video_.complaint(); }
 
  private:
@@ -107,6 +140,7 @@ class StreamSource : public FrameSource {
   std::optional<int> frame_count() const override { return std::nullopt; }
   double frames_per_second() const override { return stream_.frames_per_second(); }
   std::string remark() const override { return stream_.remark(); }
+  bool is_srgb() const override { return stream_.is_srgb(); }
 
  private:
   VideoReader stream_;
@@ -127,13 +161,20 @@ Pictures pictures_in(const fs::path& folder) {
     if (has_image_extension(entry.path())) files.push_back(entry.path());
     unread += has_unread_extension(entry.path());
   }
-  // frame9.png comes before frame10.png.
-  std::sort(files.begin(), files.end(),
-            [](const fs::path& a, const fs::path& b) { return strverscmp(a.c_str(), b.c_str()) < 0; });
   if (files.empty())
-    throw InputError(folder.string(), std::string("has no images") + (unread > 0 ? " but in HEIC or AVIF" : "") +
+    throw InputError(folder.string(), std::string("has no images") + (unread > 0 ? " but in HEIC, AVIF or DICOM" : "") +
                                           ", expected some (png, jpg, bmp, tif, webp, ppm)");
-  return {std::move(files), unread};
+  return {ordered_pictures(std::move(files)), unread};
+}
+
+void refuse_dicom(const fs::path& path) {
+  constexpr std::size_t preamble = 128;
+  std::array<char, preamble + 4> head{};
+  std::ifstream(path, std::ios::binary).read(head.data(), head.size());
+  if (std::string_view(head.data(), head.size()).substr(preamble) == "DICM")
+    throw InputError(path.string(),
+                     "is DICOM, which is not read: write its frames as PNG into a folder (of dcmtk: "
+                     "dcmj2pnm --all-frames --write-png FILE FOLDER/frame)");
 }
 
 }  // namespace
@@ -148,8 +189,9 @@ std::unique_ptr<FrameSource> open_frame_source(const std::string& input, double 
   if (fs::is_directory(input)) return std::make_unique<PictureSource>(Kind::folder, pictures_in(input), folder_fps);
   if (fs::is_regular_file(input) && fs::file_size(input) == 0)
     throw InputError(input, "is empty, expected an image or a video");
+  if (fs::is_regular_file(input)) refuse_dicom(input);
   if (has_image_extension(input) || has_unread_extension(input))
-    return std::make_unique<PictureSource>(Kind::image, Pictures{{input}}, folder_fps);
+    return std::make_unique<PictureSource>(Kind::image, Pictures{{{input}}}, folder_fps);
   if (!fs::is_regular_file(input)) throw InputError(input, "is no file, expected an image, a folder or a video");
   return std::make_unique<VideoSource>(input, reading);
 }

@@ -19,7 +19,7 @@ struct Frame {
   std::optional<Status> flaw;  ///< why nothing is to be measured in it
 };
 
-/// Frames of an image, a folder of images (sorted by name, numbers in names by value), a video file, a stream
+/// Frames of an image, a folder of images (in the order of the numbers in their names), a video file, a stream
 /// ("rtsp://...") or a camera.
 class FrameSource {
  public:
@@ -36,6 +36,8 @@ class FrameSource {
   virtual std::optional<double> first_stamp_s() const { return std::nullopt; }
   /// How it is read where the file does not say, in words, and the option that decides; empty where it says.
   virtual std::string remark() const { return {}; }
+  /// Whether its values are light in sRGB by what the file names (HLG, PQ, linear), whatever the camera's response.
+  virtual bool is_srgb() const { return false; }
   /// After the end: what is wrong with the file as a whole, for example that it ends early; empty when nothing is.
   virtual std::string complaint() const { return {}; }
 };

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <string>
 #include <thread>
+#include <tuple>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -76,7 +77,15 @@ TEST(FolderSource, SaysWhatItLeavesOut) {
   write_image(folder / "a.png", cv::Mat(16, 16, CV_8UC3, cv::Scalar(20, 120, 220)));
   const auto source = open_frame_source(folder.path().string(), 30);
   EXPECT_EQ(source->frame_count(), 1);
-  EXPECT_EQ(source->remark(), "1 images in HEIC or AVIF are left out: convert them to PNG");
+  EXPECT_EQ(source->remark(), "1 images in HEIC, AVIF or DICOM are left out: convert them to PNG");
+}
+
+TEST(FolderSource, SaysTheOrderWherePointsDecide) {
+  const testing::TemporaryFolder folder;
+  for (const char* name : {"0.5.png", "0.25.png", "10.5.png", "1.5.png"})
+    write_image(folder / name, cv::Mat(16, 16, CV_8UC3));
+  EXPECT_EQ(open_frame_source(folder.path().string(), 30)->remark(),
+            "points and signs of the numbers in the names decide the order: 0.25.png, 0.5.png ... 10.5.png");
 }
 
 // 12 bits as cameras' drivers leave them, and 16.
@@ -161,6 +170,49 @@ TEST(VideoSource, MarksFramesOfMotionJpegWhoseDataGoOn) {
   const VideoRead damaged = read_video(folder / "a.mjpeg");
   EXPECT_EQ(damaged.frames, 6);
   EXPECT_EQ(damaged.damaged, 1);
+}
+
+// Containers, MPEG-2 and x264 say theirs.
+TEST(VideoSource, SaysTheRateThatItAssumes) {
+  const testing::TemporaryFolder folder;
+  const std::string video = "-f lavfi -i testsrc=s=64x48:r=50 -frames:v 10 ";
+  for (const auto& [name, arguments, assumes] : {std::tuple{"a.mjpeg", "-c:v mjpeg", true},
+                                                 {"b.mjpg", "-c:v mjpeg -f mjpeg", true},
+
+                                                 {"a.m4v", "-c:v mpeg4 -f m4v", false},
+                                                 {"a.avi", "-c:v mjpeg", false},
+                                                 {"a.m2v", "-c:v mpeg2video", false},
+                                                 {"a.h264", "-c:v libx264", false}}) {
+    if (!testing::ffmpeg(video + arguments + " '" + (folder / name).string() + "'")) continue;
+    const auto source = open_frame_source((folder / name).string(), 30);
+    EXPECT_EQ(source->remark().find("names no times and no rate: read as 25 frames/s") != std::string::npos, assumes)
+        << name << ": " << source->remark();
+    EXPECT_EQ(source->frames_per_second(), assumes ? 25 : 50) << name;
+  }
+}
+
+// Its recorder was switched off before it wrote where the frames are.
+TEST(OpenFrameSource, NamesAVideoWithoutItsIndex) {
+  const testing::TemporaryFolder folder;
+  for (const char* name : {"a.mp4", "a.mov", "a.m4v"}) {
+    write_video(folder / name);
+    const std::string whole = read_file(folder / name);
+    const std::size_t index = whole.find("moov");
+    ASSERT_NE(index, std::string::npos);
+    testing::write_file(folder / name, whole.substr(0, index - 4));
+    const std::string said = testing::input_error([&] { open_frame_source((folder / name).string(), 30); });
+    EXPECT_NE(said.find("has no index (moov)"), std::string::npos) << said;
+  }
+}
+
+TEST(OpenFrameSource, NamesDicom) {
+  const testing::TemporaryFolder folder;
+  const std::string dicom = std::string(128, '\0') + "DICM" + std::string("\2\0\0\0UL\4\0\0\0\0\0", 12);
+  for (const char* name : {"a.dcm", "IM00001", "a.png", "a.mp4"}) {
+    testing::write_file(folder / name, dicom);
+    const std::string said = testing::input_error([&] { open_frame_source((folder / name).string(), 30); });
+    EXPECT_NE(said.find("is DICOM, which is not read: write its frames as PNG"), std::string::npos) << said;
+  }
 }
 
 TEST(OpenFrameSource, NamesWhatCanNotBeRead) {

@@ -16,7 +16,9 @@
 #include "lapservo/io/pictures/exif_orientation.h"
 #include "lapservo/io/pictures/jpeg_encoding.h"
 #include "lapservo/io/pictures/jpeg_picture.h"
+#include "lapservo/io/pictures/jpeg_segments.h"
 #include "lapservo/io/pictures/libav_picture.h"
+#include "lapservo/io/pictures/picture_count.h"
 #include "lapservo/io/pictures/png_encoding.h"
 #include "lapservo/io/pictures/png_picture.h"
 #include "lapservo/io/pictures/tiff_directory.h"
@@ -29,6 +31,10 @@ namespace fs = std::filesystem;
 
 constexpr std::uint32_t max_side_px = 16384;
 constexpr std::size_t max_bytes = std::size_t{256} << 20;
+
+std::string_view text_of(std::span<const std::uint8_t> bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
 
 bool starts_with(std::span<const std::uint8_t> bytes, std::string_view magic) {
   return bytes.size() >= magic.size() && std::memcmp(bytes.data(), magic.data(), magic.size()) == 0;
@@ -52,22 +58,15 @@ struct JpegHeader {
   int channels = 0;
 };
 
-// Pixels by the first frame header (SOF); zero without one. Steps over garbage between segments as decoders do.
+// Pixels by the first frame header (SOF); zero without one.
 JpegHeader jpeg_header(std::span<const std::uint8_t> bytes) {
-  const auto two_at = [&](std::size_t at) { return std::uint32_t{bytes[at]} << 8 | std::uint32_t{bytes[at + 1]}; };
-  std::size_t at = 2;
-  while (at + 9 <= bytes.size()) {
-    const std::uint8_t marker = bytes[at + 1];
-    const bool stands_alone = marker == 0x01 || (marker >= 0xd0 && marker <= 0xd8);
-    if (bytes[at] != 0xff || marker == 0 || marker == 0xff) {
-      ++at;
-    } else if (stands_alone) {
-      at += 2;
-    } else if (marker >= 0xc0 && marker <= 0xcf && marker != 0xc4 && marker != 0xc8 && marker != 0xcc) {
-      return {{two_at(at + 7), two_at(at + 5)}, at + 9 < bytes.size() ? bytes[at + 9] : 0};
-    } else {
-      at += 2 + std::max<std::size_t>(two_at(at + 2), 2);
-    }
+  for (auto segment = jpeg_segment(bytes, 2); segment; segment = jpeg_segment(bytes, segment->end)) {
+    const std::uint8_t marker = segment->marker;
+    if (marker < 0xc0 || marker > 0xcf || marker == 0xc4 || marker == 0xc8 || marker == 0xcc) continue;
+    const auto number = [&](std::size_t at, std::size_t count) {
+      return static_cast<std::uint32_t>(Numbers{segment->content, true}.of(at, count));
+    };
+    return {{number(3, 2), number(1, 2)}, static_cast<int>(number(5, 1))};
   }
   return {};
 }
@@ -97,17 +96,13 @@ std::size_t least_bytes(std::span<const std::uint8_t> bytes, const std::string& 
 // Decoders return half an image for half a file, and fill gigabytes for a few bytes: ask for end and size beforehand.
 void check_whole(std::span<const std::uint8_t> bytes, const std::string& source) {
   using namespace std::string_view_literals;
-  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  const std::string_view text = text_of(bytes);
   if (is_png(bytes)) {
     if (bytes.size() < 33 || text.rfind("IEND"sv) == std::string_view::npos)
       throw InputError(source, "is a truncated PNG, expected a whole image");
     check_size(png_size(bytes), source);
   }
-  if (is_jpeg(bytes)) {
-    if (text.rfind("\xff\xd9"sv) == std::string_view::npos)
-      throw InputError(source, "is a truncated JPEG, expected a whole image");
-    check_size(jpeg_header(bytes).size, source);
-  }
+  if (is_jpeg(bytes)) check_size(jpeg_header(bytes).size, source);
   if (const std::string format = libav_format(bytes); bytes.size() < least_bytes(bytes, format))
     throw InputError(source, "is a truncated " + format + ", expected a whole image");
   if (!tiff_has_its_rows(bytes)) throw InputError(source, "is a truncated TIFF, expected a whole image");
@@ -115,12 +110,18 @@ void check_whole(std::span<const std::uint8_t> bytes, const std::string& source)
 
 // "HEIC" or "AVIF" by the brand that follows the box of the file's type; else empty.
 std::string unread_format(std::span<const std::uint8_t> bytes) {
-  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), std::min<std::size_t>(bytes.size(), 12));
+  const std::string_view text = text_of(bytes).substr(0, 12);
   if (text.size() < 12 || text.substr(4, 4) != "ftyp") return "";
   const std::string_view brand = text.substr(8);
   if (brand == "avif" || brand == "avis") return "AVIF";
   constexpr std::array<std::string_view, 8> heic{"heic", "heix", "heim", "heis", "hevc", "hevx", "mif1", "msf1"};
   return std::find(heic.begin(), heic.end(), brand) != heic.end() ? "HEIC" : "";
+}
+
+void refuse_several(std::span<const std::uint8_t> bytes, const std::string& source) {
+  if (const std::size_t count = picture_count(bytes); count > 1)
+    throw InputError(source,
+                     "holds " + std::to_string(count) + " images, expected one: write them into a folder, one a file");
 }
 
 // FFmpeg takes all samples for unsigned, and YCbCr for a video's.
@@ -161,7 +162,8 @@ bool is_written(const fs::path& path) {
 
 bool has_unread_extension(const fs::path& path) {
   const std::string extension = lower_case(path.extension().string());
-  return extension == ".heic" || extension == ".heif" || extension == ".avif";
+  static constexpr std::array<std::string_view, 5> known{".heic", ".heif", ".avif", ".dcm", ".dicom"};
+  return std::find(known.begin(), known.end(), extension) != known.end();
 }
 
 cv::Mat bgr8_from(const cv::Mat& image, const std::string& source) {
@@ -206,12 +208,15 @@ bool has_few_colours(const cv::Mat& bgr) {
 Picture decode_picture(std::span<const std::uint8_t> bytes, const std::string& source) {
   if (bytes.empty()) throw InputError(source, "is empty, expected an image");
   check_whole(bytes, source);
+  refuse_several(bytes, source);
   refuse_misread(bytes, source);
   // 0 and numbers above 8 have no meaning in EXIF; they are shown upright everywhere.
   if (const auto orientation = exif_orientation(bytes); orientation && *orientation >= 2 && *orientation <= 8)
     throw InputError(source, "EXIF orientation", std::to_string(*orientation),
                      "1: the pixels as the calibrated camera has them, not to be turned");
   DecodedPicture decoded = decode(bytes);
+  if (is_jpeg(bytes) && !decoded.complaint.empty() && text_of(bytes).rfind("\xff\xd9") == std::string_view::npos)
+    throw InputError(source, "is a truncated JPEG, expected a whole image");
   if (decoded.bgr.empty())
     throw InputError(source, "can't be decoded, expected a PNG, JPEG, BMP, TIFF, WebP, PPM or PGM image");
   check_size({static_cast<std::uint32_t>(decoded.bgr.cols), static_cast<std::uint32_t>(decoded.bgr.rows)}, source);

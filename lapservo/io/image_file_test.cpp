@@ -18,6 +18,7 @@
 #include "lapservo/io/pictures/png_encoding.h"
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
+#include "lapservo/testing/videos.h"
 
 namespace lapservo::internal {
 namespace {
@@ -165,12 +166,12 @@ TEST(Image, OfNoMoreColoursThanAPaletteIsFlagged) {
 TEST(Image, IsRefusedWhereverTheFileIsCut) {
   Random random(seed);
   const cv::Mat image = random_image<std::uint8_t>(12, 12, CV_8UC3, random);
-  // The signature of the format; and the checksum after a PNG's last chunk, without which the image is whole.
+  // The signature of the format; and a PNG's last checksum or a JPEG's end marker, without which the image is whole.
   struct Format {
     std::string extension, name;
     std::size_t signature, dispensable;
   };
-  for (const Format& format : {Format{".png", "PNG", 8, 4}, Format{".jpg", "JPEG", 2, 0}}) {
+  for (const Format& format : {Format{".png", "PNG", 8, 4}, Format{".jpg", "JPEG", 2, 2}}) {
     const Bytes whole = encoded(image, format.extension);
     EXPECT_EQ(refusal(whole), "");
     for (std::size_t size = 1; size < whole.size() - format.dispensable; ++size)
@@ -197,6 +198,54 @@ TEST(Image, OfAFormatThatIsNotReadIsNamed) {
   ASSERT_NE(at, jpeg.end());
   at[9] = 4;
   EXPECT_EQ(refusal(jpeg), "p: is a JPEG in CMYK, which is not read: convert it to PNG in RGB");
+}
+
+Bytes joined(const std::vector<Bytes>& parts) {
+  Bytes all;
+  for (const Bytes& part : parts) all.insert(all.end(), part.begin(), part.end());
+  return all;
+}
+
+Bytes bytes_of(const std::string& text) {
+  return {text.begin(), text.end()};
+}
+
+TEST(Image, OfSeveralPicturesInOneFileIsRefusedAndCounted) {
+  Random random(seed);
+  const cv::Mat image = random_image<std::uint8_t>(5, 7, CV_8UC3, random);
+  const Bytes png = encoded(image, ".png"), jpeg = encoded(image, ".jpg");
+  const std::string pixels(std::size_t{3} * 5 * 7, 'P');
+  const Bytes ppm = bytes_of("P6 # by hand\n7 5 255\n" + pixels), pgm = bytes_of("P5\n7 5\n255\n" + pixels.substr(70));
+  const Bytes deep = bytes_of("P6\n7 5\n65535\n" + pixels + pixels), text = bytes_of("P3\n1 1\n255\n1 2 3\n");
+  Bytes bmp = bytes_of(std::string("BM\x4a\0\0\0\0\0\0\0\x36\0\0\0\x28\0\0\0\1\0\0\0\5\0\0\0\1\0\x18\0", 30));
+  bmp.resize(74);
+  // A thumbnail within a segment, bytes behind the end, and a second image that MPF names do not count.
+  Bytes with_thumbnail = jpeg, with_mpf = jpeg;
+  const Bytes segment = joined({{0xff, 0xe1, 0, 8}, {0xff, 0xd9, 0xff, 0xd8, 0xff, 0xd9}});
+  with_thumbnail.insert(with_thumbnail.begin() + 2, segment.begin(), segment.end());
+  const Bytes mpf{0xff, 0xe2, 0, 6, 'M', 'P', 'F', 0};
+  with_mpf.insert(with_mpf.begin() + 2, mpf.begin(), mpf.end());
+  for (const Bytes& single : {png, jpeg, ppm, pgm, deep, text, bmp, with_thumbnail, joined({with_mpf, jpeg}),
+                              joined({png, bytes_of("\n")}), joined({jpeg, Bytes(16, 0), bytes_of("SEFT")})})
+    EXPECT_EQ(refusal(single), "") << std::string(single.begin(), single.begin() + 2);
+  for (const Bytes& one : {png, jpeg, ppm, pgm, deep, text, bmp})
+    for (const Bytes& between : {Bytes{}, Bytes(3, 0)}) {
+      if (one == ppm && !between.empty()) continue;  // netpbm's have nothing between them
+      EXPECT_EQ(refusal(joined({one, between, one, between, one})),
+                "p: holds 3 images, expected one: write them into a folder, one a file")
+          << std::string(one.begin(), one.begin() + 2);
+    }
+}
+
+TEST(Image, ThatIsAnAnimationIsRefusedAndCounted) {
+  const TemporaryFolder folder;
+  for (const auto& [name, format] : {std::pair{"a.png", "apng"}, {"a.webp", "webp"}}) {
+    const auto path = folder / name;
+    if (!testing::ffmpeg("-f lavfi -i testsrc=s=64x48:r=25 -frames:v 5 -f " + std::string(format) + " '" +
+                         path.string() + "'"))
+      GTEST_SKIP() << "FFmpeg here can't write " << name;
+    EXPECT_NE(input_error([&] { read_picture(path); }).find("holds 5 images, expected one"), std::string::npos);
+  }
 }
 
 // A file of some bytes must not ask for gigabytes.

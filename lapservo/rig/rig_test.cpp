@@ -449,5 +449,12 @@ TEST(Rig, ReadsPlumbBobOfFourFiveEightAndNoNumbers) {
   EXPECT_EQ(distortion(with("distortion_model: plumb_bob", "distortion_model: rational_polynomial")), expected);
 }
 
+// Endoscopes show a circle: the corners were never measured.
+TEST(Rig, OfALensThatFoldsInTheCornersAloneIsTaken) {
+  const Rig rig = parse_rig(with("[-0.1, 0.02, 0.001, -0.002, 0]", "[-0.45, 0, 0, 0, 0]"), "rig.yaml", "");
+  EXPECT_FALSE(rig.camera.ideal_from_raw({0, 0}));
+  EXPECT_TRUE(rig.camera.ideal_from_raw({639.5, 0}));
+}
+
 }  // namespace
 }  // namespace lapservo::internal

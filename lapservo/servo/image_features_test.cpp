@@ -5,6 +5,7 @@
 #include <Eigen/Cholesky>
 #include <gtest/gtest.h>
 
+#include "lapservo/geometry/invertible.h"
 #include "lapservo/kinematics/centre_line.h"
 #include "lapservo/kinematics/feature_map.h"
 #include "lapservo/kinematics/rcm_kinematics.h"
@@ -102,6 +103,22 @@ TEST(ImageFeatures, TheWindowLiesInThePicture) {
         EXPECT_LE(raw.y(), camera.height_px - 1 - 19.9) << k1;
       }
   }
+}
+
+TEST(ImageFeatures, TheWindowLeavesOutCornersThatTheLensFolds) {
+  Camera camera = testing::paper_test_rig().camera;
+  for (double& k1 = camera.distortion[0]; is_invertible(camera); k1 -= 0.01) {
+    if (is_invertible_everywhere(camera)) continue;
+    const ImageWindow window = image_window(camera, 20);
+    EXPECT_GT(window.u_max_px - window.u_min_px, 0.3 * camera.width_px) << k1;
+    for (const double u : {window.u_min_px, window.u_max_px})
+      for (const double v : {window.v_min_px, window.v_max_px}) {
+        const Eigen::Vector2d raw = camera.raw_from_ideal({u, v});
+        EXPECT_TRUE(camera.contains(raw, 19.9)) << k1;
+        EXPECT_LE((camera.ideal_from_raw(raw).value() - Eigen::Vector2d(u, v)).norm(), 1e-6) << k1;
+      }
+  }
+  EXPECT_LT(camera.distortion[0], -0.1) << "the loop saw none";
 }
 
 }  // namespace

@@ -1,28 +1,52 @@
 #include "lapservo/servo/image_window.h"
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 
 #include "lapservo/core/error.h"
+#include "lapservo/geometry/field_of_view.h"
 
 namespace lapservo {
+
+namespace {
+
+// A square of rays that holds all that the distortion does not fold.
+ImageWindow unfolded(const Camera& camera) {
+  const double farthest = std::tan(internal::half_field_rad(camera));
+  const double u_px = farthest * camera.fx_px, v_px = farthest * camera.fy_px;
+  return {camera.cx_px - u_px, camera.cx_px + u_px, camera.cy_px - v_px, camera.cy_px + v_px};
+}
+
+// Shrinks it until its corners lie where the distortion does not fold.
+void leave_out_fold(const Camera& camera, ImageWindow& window) {
+  double farthest = 0;
+  for (const double u : {window.u_min_px, window.u_max_px})
+    for (const double v : {window.v_min_px, window.v_max_px})
+      farthest = std::max(farthest, camera.ray_from_ideal({u, v}).head<2>().norm());
+  const double part = std::min(1.0, std::tan(internal::half_field_rad(camera)) / farthest);
+  for (double* u : {&window.u_min_px, &window.u_max_px}) *u = camera.cx_px + part * (*u - camera.cx_px);
+  for (double* v : {&window.v_min_px, &window.v_max_px}) *v = camera.cy_px + part * (*v - camera.cy_px);
+}
+
+}  // namespace
 
 ImageWindow image_window(const Camera& camera, double margin_px) {
   constexpr int steps = 64;
   const double right = camera.width_px - 1 - margin_px, bottom = camera.height_px - 1 - margin_px;
-  const auto ideal = [&](double u, double v) {
-    const auto px = camera.ideal_from_raw({u, v});
-    if (!px) throw InputError("controller", "margin_px", std::to_string(margin_px), "a margin inside the image");
-    return *px;
+  const auto narrow = [&](double& bound, double u, double v, int axis, bool is_low) {
+    if (const auto px = camera.ideal_from_raw({u, v}))
+      bound = is_low ? std::max(bound, (*px)[axis]) : std::min(bound, (*px)[axis]);
   };
-  ImageWindow window{-1e9, 1e9, -1e9, 1e9};
+  ImageWindow window = unfolded(camera);
   for (int i = 0; i <= steps; ++i) {
     const double u = margin_px + (right - margin_px) * i / steps, v = margin_px + (bottom - margin_px) * i / steps;
-    window.u_min_px = std::max(window.u_min_px, ideal(margin_px, v).x());
-    window.u_max_px = std::min(window.u_max_px, ideal(right, v).x());
-    window.v_min_px = std::max(window.v_min_px, ideal(u, margin_px).y());
-    window.v_max_px = std::min(window.v_max_px, ideal(u, bottom).y());
+    narrow(window.u_min_px, margin_px, v, 0, true);
+    narrow(window.u_max_px, right, v, 0, false);
+    narrow(window.v_min_px, u, margin_px, 1, true);
+    narrow(window.v_max_px, u, bottom, 1, false);
   }
+  leave_out_fold(camera, window);
   if (!(window.u_max_px > window.u_min_px && window.v_max_px > window.v_min_px))
     throw InputError("controller", "margin_px", std::to_string(margin_px), "a margin that leaves some of the image");
   return window;

@@ -6,7 +6,7 @@
 namespace lapservo {
 
 /// The camera's image less a margin, in ideal pixels: the largest upright rectangle of which every point lies in the
-/// (distorted) image. Throws InputError when the margin leaves nothing.
+/// (distorted) image, and none where the distortion folds. Throws InputError when the margin leaves nothing.
 ImageWindow image_window(const Camera& camera, double margin_px);
 
 }  // namespace lapservo

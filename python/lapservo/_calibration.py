@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _lapservo as _core  # type: ignore[attr-defined]
+from ._errors import InputError
 
 _Array = NDArray[np.float64]
 _Image = NDArray[np.uint8]
@@ -209,7 +210,7 @@ def calibrate_marker(
     frames: Frames,
     rig: Union[Any, _Path],
     *,
-    joints: Union[_Path, Mapping[str, ArrayLike], None] = None,
+    joints: Union[_Path, Mapping[str, ArrayLike], Any, None] = None,
     instrument: Optional[str] = None,
     deinterlace: bool = False,
     fps: float = 30.0,
@@ -217,7 +218,7 @@ def calibrate_marker(
 ) -> MarkerCalibration:
     """Measures a mounted marker's print from frames of a slow full turn: bands, wrap, skew, gap.
 
-    rig: a Rig or its path; joints: a CSV's path, or arrays by name, time_s [s] and those of the rig's joints [rad, rad,
+    rig: a Rig or its path; joints: a CSV's path, or arrays by name (a dict, a DataFrame), time_s [s] and those of the rig's joints [rad, rad,
     m, rad]: the seam too, which takes the rig's camera_from_rcm and joints; instrument: its name, where the rig has
     several; fps: of a folder or of arrays.
 
@@ -233,7 +234,7 @@ def calibrate_registration(
     frames: Frames,
     rig: Union[Any, _Path],
     *,
-    joints: Union[_Path, Mapping[str, ArrayLike], None] = None,
+    joints: Union[_Path, Mapping[str, ArrayLike], Any, None] = None,
     instrument: Optional[str] = None,
     deinterlace: bool = False,
     fps: float = 30.0,
@@ -242,7 +243,7 @@ def calibrate_registration(
     """Measures where the arm stands before the camera, its joints' signs and offsets, and the video's delay.
 
     frames: of the marker in motion, or a CSV of observations that were tracked without camera_from_rcm; joints: a CSV's
-    path, or arrays by name, time_s [s] and four joints [rad, rad, m, rad], by a clock up to 3 s off; without any only
+    path, or arrays by name (a dict, a DataFrame), time_s [s] and four joints [rad, rad, m, rad], by a clock up to 3 s off; without any only
     the RCM's place is measured. rig: a Rig or its path; fps: of a folder or of arrays.
 
     Raises InputError for what can't be used, and with `problem` where the frames don't suffice.
@@ -254,6 +255,32 @@ def calibrate_registration(
 
 
 def _columns(joints: Any) -> Any:
-    if isinstance(joints, Mapping):
-        return {str(name): np.asarray(values, float).tolist() for name, values in joints.items()}
-    return joints
+    """A path as it is; else lists of numbers by name, of a mapping or a table (pandas, a structured array)."""
+    if joints is None or isinstance(joints, (str, os.PathLike)):
+        return joints
+    names = joints.keys() if hasattr(joints, "keys") else getattr(joints, "columns", None)
+    if names is None:
+        names = getattr(getattr(joints, "dtype", None), "names", None)
+    if names is None:
+        raise _refused("joints", "type", type(joints).__name__, "a CSV's path, or numbers by name: time_s and the joints")
+    columns: dict[str, list[float]] = {}
+    for name in names:
+        if str(name) in columns or np.ndim(joints[name]) != 1:
+            raise _refused("joints", str(name), "not one column", "one column of numbers of this name")
+        columns[str(name)] = _numbers(joints[name], str(name))
+    return columns
+
+
+def _numbers(values: Any, name: str) -> list[float]:
+    array = np.asarray(values)
+    try:
+        if array.dtype.kind in "fiubO":
+            return np.asarray(array, float).tolist()  # type: ignore[no-any-return]
+    except (TypeError, ValueError):
+        pass
+    kind = type(array.flat[0]).__name__ if array.dtype.kind == "O" else str(array.dtype)
+    raise _refused("joints", name, kind, "numbers; times in seconds: (t - t[0]) / numpy.timedelta64(1, 's')")
+
+
+def _refused(source: str, name: str, value: str, expectation: str) -> InputError:
+    return InputError(f"{source}: {name}: is {value}, expected {expectation}", source, name, value, expectation)

@@ -50,6 +50,13 @@ bool has_columns(const py::array& array, int columns) {
   return (array.ndim() == 1 || array.ndim() == 2) && end[-1] == columns;
 }
 
+// Which Python takes for a number of its unit.
+bool is_numpy_time(const py::handle& given) {
+  const py::object type = py::getattr(given, "dtype", py::none());
+  return py::isinstance<py::dtype>(type) &&
+         std::string_view("mM").find(type.cast<py::dtype>().kind()) != std::string_view::npos;
+}
+
 }  // namespace
 
 Eigen::MatrixXd numbers_of(const py::handle& given, const char* argument, int rows, int columns, Numbers numbers) {
@@ -70,13 +77,17 @@ std::vector<Eigen::Vector4d> rows_of(const Eigen::Matrix<double, Eigen::Dynamic,
   return rows;
 }
 
-double number_of(const py::handle& given, const char* argument) {
+double number_of(const py::handle& given, const char* argument, Numbers numbers) {
+  const std::string expected = numbers == Numbers::finite ? "a finite number" : "a number";
+  if (is_numpy_time(given))
+    throw InputError(argument, "type", py::str(given.attr("dtype")).cast<std::string>(), expected + " of seconds");
   const double number = PyFloat_AsDouble(given.ptr());
   if (PyErr_Occurred()) {
     PyErr_Clear();
-    throw InputError(argument, "type", type_name(given), "a finite number");
+    throw InputError(argument, "type", type_name(given), expected);
   }
-  if (!std::isfinite(number)) throw InputError(argument, "value", fmt::format("{}", number), "a finite number");
+  if (numbers == Numbers::finite && !std::isfinite(number))
+    throw InputError(argument, "value", fmt::format("{}", number), expected);
   return number;
 }
 

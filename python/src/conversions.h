@@ -42,8 +42,8 @@ Eigen::MatrixXd numbers_of(const py::handle& given, const char* argument, int ro
                            Numbers numbers = Numbers::finite);
 /// Rows of a matrix of four columns.
 std::vector<Eigen::Vector4d> rows_of(const Eigen::Matrix<double, Eigen::Dynamic, 4>& matrix);
-/// A finite one. Throws InputError naming `argument`.
-double number_of(const py::handle& given, const char* argument);
+/// Throws InputError naming `argument`, also for numpy's times.
+double number_of(const py::handle& given, const char* argument, Numbers numbers = Numbers::finite);
 
 /// An argument's name, as an argument of the templates below.
 template <std::size_t N>
@@ -66,11 +66,11 @@ struct Pose {
   static constexpr auto type = py::detail::const_name("ArrayLike");
   static Pose of(const py::handle& given) { return {rigid_of(given, name.text)}; }
 };
-template <Name name>
+template <Name name, Numbers numbers = Numbers::finite>
 struct Number {
   double value = 0;
   static constexpr auto type = py::detail::const_name("float");
-  static Number of(const py::handle& given) { return {number_of(given, name.text)}; }
+  static Number of(const py::handle& given) { return {number_of(given, name.text, numbers)}; }
 };
 template <Name name>
 struct Picture {
@@ -111,9 +111,9 @@ struct type_caster<lapservo::python::Array<name, Rows, Columns, numbers>>
     : lapservo::python::ArgumentCaster<lapservo::python::Array<name, Rows, Columns, numbers>> {};
 template <lapservo::python::Name name>
 struct type_caster<lapservo::python::Pose<name>> : lapservo::python::ArgumentCaster<lapservo::python::Pose<name>> {};
-template <lapservo::python::Name name>
-struct type_caster<lapservo::python::Number<name>> : lapservo::python::ArgumentCaster<lapservo::python::Number<name>> {
-};
+template <lapservo::python::Name name, lapservo::python::Numbers numbers>
+struct type_caster<lapservo::python::Number<name, numbers>>
+    : lapservo::python::ArgumentCaster<lapservo::python::Number<name, numbers>> {};
 template <lapservo::python::Name name>
 struct type_caster<lapservo::python::Picture<name>>
     : lapservo::python::ArgumentCaster<lapservo::python::Picture<name>> {};

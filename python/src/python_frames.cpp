@@ -54,7 +54,7 @@ class IteratedFrames : public FrameSource {
     if (!py::isinstance<py::tuple>(item)) return frame.bgr = picture_of(item), frame;
     const auto pair = item.cast<py::tuple>();
     if (pair.size() != 2) throw InputError(named, "item", std::string(py::repr(item)), "(time_s, uint8[H, W, 3])");
-    frame.time_s = pair[0].cast<double>();
+    frame.time_s = number_of(pair[0], named, Numbers::any);
     frame.bgr = picture_of(pair[1]);
     return frame;
   }

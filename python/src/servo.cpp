@@ -53,10 +53,11 @@ class PythonRobot : public Robot {
     const py::gil_scoped_acquire mine;
     const py::function method = py::get_override(static_cast<const Robot*>(this), "readings");
     if (!method) return Robot::readings();
+    using Time = Number<"Robot.readings()", Numbers::any>;
     using Reading = Array<"Robot.readings()", 4, 1, Numbers::any>;
     std::vector<JointReading> readings;
-    for (const auto& [time_s, q] : method().cast<std::vector<std::pair<double, Reading>>>())
-      readings.push_back({time_s, JointVector::from_vector(q.value)});
+    for (const auto& [time_s, q] : method().cast<std::vector<std::pair<Time, Reading>>>())
+      readings.push_back({time_s.value, JointVector::from_vector(q.value)});
     return readings;
   }
   void send(const JointPath& path) override { PYBIND11_OVERRIDE_PURE(void, Robot, send, path); }
@@ -80,15 +81,16 @@ class PythonImageStream : public ImageStream {
     const py::object given = method();
     if (given.is_none()) return std::nullopt;
     const auto pair = sequence_of(given, 2, "ImageStream.newest()", "(time_s, uint8[H, W, 3]) or None");
-    return StampedImage{py::object(pair[0]).cast<double>(), view_of(pair[1], "ImageStream.newest()").clone()};
+    return StampedImage{number_of(pair[0], "ImageStream.newest()", Numbers::any),
+                        view_of(pair[1], "ImageStream.newest()").clone()};
   }
 };
 
 void bind_ports(py::module_& m) {
   py::class_<JointState>(m, "JointState", "State of an arm.")
-      .def(py::init([](double time_s, const Array<"q", 4, 1, Numbers::any>& q, const std::string& operating_state,
-                       bool follows, bool started, const std::string& blocked) {
-             return JointState{time_s,
+      .def(py::init([](const Number<"time_s", Numbers::any>& time_s, const Array<"q", 4, 1, Numbers::any>& q,
+                       const std::string& operating_state, bool follows, bool started, const std::string& blocked) {
+             return JointState{time_s.value,
                                JointVector::from_vector(q.value),
                                operating_state_of(operating_state),
                                follows,
@@ -116,8 +118,8 @@ void bind_ports(py::module_& m) {
       .def("copy", [](const JointPath& self) { return JointPath(self); })
       .def(
           "at",
-          [](const JointPath& self, double time_s) {
-            const MotionState state = self.at(time_s);
+          [](const JointPath& self, const Number<"time_s", Numbers::any>& time_s) {
+            const MotionState state = self.at(time_s.value);
             return std::pair(state.position, state.velocity);
           },
           py::arg("time_s"), "(float[4] positions, float[4] velocities) at a time of the loop's clock.");
@@ -199,8 +201,8 @@ void bind_trajectories(py::module_& m) {
       .def_readonly("duration_s", &Trajectory::duration_s)
       .def(
           "at",
-          [](const Trajectory& self, double time_s) {
-            const DesiredFeatures desired = self.at(time_s);
+          [](const Trajectory& self, const Number<"time_s", Numbers::any>& time_s) {
+            const DesiredFeatures desired = self.at(time_s.value);
             return std::tuple(desired.features, desired.rate, desired.acceleration);
           },
           py::arg("time_s"), "(features, rates, accelerations), each float[4].");

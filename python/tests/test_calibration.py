@@ -209,9 +209,72 @@ def test_what_frames_raise_leaves_the_calibration(rig):
 
 
 @pytest.mark.parametrize("wrong", [3, None, [1, 2]])
-def test_a_wrong_type_is_a_type_error(rig, image, wrong):
+def test_a_rig_of_a_wrong_type_is_a_type_error(rig, image, wrong):
     with pytest.raises(TypeError):
         lapservo.calibrate_colour([image], wrong)
-    if wrong is not None:
-        with pytest.raises(TypeError):
-            lapservo.calibrate_registration([image], rig, joints=wrong)
+
+
+class Table:
+    """A table of columns, with the methods of a pandas DataFrame that are used."""
+
+    def __init__(self, columns):
+        self.pairs = columns
+
+    @property
+    def columns(self):
+        return [name for name, _ in self.pairs]
+
+    def keys(self):
+        return self.columns
+
+    def __getitem__(self, name):
+        values = [values for other, values in self.pairs if other == name]
+        return values[0] if len(values) == 1 else np.stack(values, axis=1)
+
+
+TIMES = np.array([0, 0.5, 1])
+JOINTS = {"time_s": TIMES, "a": [0, 0.1, 0.2], "b": (0, 0, 0), "c": np.zeros(3, int), "d": np.zeros(3, np.float32)}
+STRUCTURED = np.zeros(3, [(name, float) for name in JOINTS])
+STRUCTURED["time_s"] = TIMES
+STAMPS = np.datetime64("2026-01-01T00:00:00", "ns") + (1e9 * TIMES).astype("timedelta64[ns]")
+
+
+@pytest.mark.parametrize("joints", [JOINTS, Table(list(JOINTS.items())), STRUCTURED])
+def test_joints_are_taken_from_any_table_of_columns(rig, joints):
+    grey = np.full((rig.camera.height_px, rig.camera.width_px, 3), 90, np.uint8)
+    free = lapservo.Rig(rig.camera, [lapservo.Instrument("PSM1", rig.instruments[0].marker)])
+    assert "PSM1 is in none" in refused(lapservo.calibrate_registration, [grey], free, joints=joints).problem
+
+
+@pytest.mark.parametrize(("joints", "field", "value"), [
+    (3, "type", "int"),
+    ([1, 2], "type", "list"),
+    ([[0, 1, 2, 3, 4]], "type", "list"),
+    (np.zeros((3, 5)), "type", "ndarray"),
+    (JOINTS | {"time_s": STAMPS}, "time_s", "datetime64[ns]"),
+    (JOINTS | {"time_s": STAMPS - STAMPS[0]}, "time_s", "timedelta64[ns]"),
+    (JOINTS | {"time_s": STAMPS.astype("datetime64[ms]").tolist()}, "time_s", "datetime"),
+    (JOINTS | {"a": ["0", "1", "2"]}, "a", "<U1"),
+    (JOINTS | {"a": 0.5}, "a", "not one column"),
+    (JOINTS | {"a": np.zeros((3, 1))}, "a", "not one column"),
+    (Table([*JOINTS.items(), ("b", [1, 1, 1])]), "b", "not one column"),
+])
+def test_joints_that_are_no_columns_of_numbers_are_refused(rig, image, joints, field, value):
+    error = refused(lapservo.calibrate_registration, [image], rig, joints=joints)
+    assert (error.source, error.field) == ("joints", field) and error.value.startswith(value)
+    if value.startswith(("datetime64", "timedelta64")):
+        assert "seconds" in error.expectation
+
+
+@pytest.mark.parametrize("time", [STAMPS[0], STAMPS[1] - STAMPS[0], STAMPS[0].astype("datetime64[ms]").item(), "now", None])
+def test_times_of_another_type_are_refused(rig, image, time):
+    path = lapservo.set_point([0, 0, 100, 100])
+    for call in (
+        lambda: lapservo.calibrate_colour([(time, image)], rig),
+        lambda: lapservo.JointState(time, [0, 1.57, 0.06, 0]),
+        lambda: path.at(time),
+        *([] if time is None else [lambda: lapservo.Tracker(rig).track(image, time)]),
+    ):
+        error = refused(call)
+        assert error.field == "type" and "number" in error.expectation
+

@@ -13,10 +13,27 @@
 namespace lapservo::app {
 using namespace internal;
 
+void say_remark(const std::string& input, const std::string& remark) {
+  if (!remark.empty()) std::fprintf(stderr, "lapservo: %s: %s\n", input.c_str(), remark.c_str());
+}
+
+namespace {
+
+// A response that was measured was measured with images that were read so.
+void expect_srgb(const std::string& input, const Response& response) {
+  if (response.kind == Response::Kind::srgb || response.sigma) return;
+  throw InputError(input,
+                   "names how it encodes light, which is read as sRGB, but the rig's response is another, "
+                   "expected srgb, or one that calibrate camera or colour measured");
+}
+
+}  // namespace
+
 std::unique_ptr<FrameSource> open_frames(const std::string& input, const FrameOptions& options, const Camera* camera) {
   if (is_bag(input)) {
     auto frames = std::make_unique<BagFrames>(open_bag(input), options.image_topic);
     say_if_undistorted(frames->topic(), camera);
+    say_remark(input, frames->remark());
     return read_ahead(std::move(frames));
   }
   refuse_topic_outside_bags("--image-topic", options.image_topic, input);
@@ -24,8 +41,8 @@ std::unique_ptr<FrameSource> open_frames(const std::string& input, const FrameOp
   const VideoReading reading{options.deinterlace || (camera && camera->deinterlace), options.colour_matrix,
                              options.chroma_location};
   auto source = open_camera_or_file(input, options.fps, size, interrupted, reading);
-  if (const std::string remark = source->remark(); !remark.empty())
-    std::fprintf(stderr, "lapservo: %s: %s\n", input.c_str(), remark.c_str());
+  if (source->is_srgb() && camera) expect_srgb(input, camera->response);
+  say_remark(input, source->remark());
   return source->kind() == FrameSource::Kind::live ? std::move(source) : read_ahead(std::move(source));
 }
 

@@ -1,6 +1,5 @@
 #include "apps/lapservo/inputs/joint_input.h"
 
-#include <cstdio>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -22,12 +21,9 @@ std::vector<std::string> columns_of(const std::string& path) {
   return names;
 }
 
-// Reports on stderr how many readings are passed over.
+// Reports on stderr what is passed over.
 JointInput reported(JointInput input) {
-  const JointRecording& recording = input.recording;
-  if (recording.repeated > 0 || recording.of_other_arms > 0)
-    std::fprintf(stderr, "lapservo: %s: %d repeated readings and %d of other arms' joints are passed over\n",
-                 input.source.c_str(), recording.repeated, recording.of_other_arms);
+  say_remark(input.source, input.recording.remark());
   return input;
 }
 
@@ -66,6 +62,7 @@ void add_joint_topic_option(Command command, std::string& joint_topic) {
 JointInput read_joint_input(const CalibrateOptions& options, const Instrument& instrument, const FrameSource* frames) {
   if (!is_bag(options.joints)) return read_table(options, instrument);
   const auto bag = open_bag(options.joints);
+  if (options.joints != options.input) say_remark(options.joints, bag->remark());
   const BagTopic* topic = joint_topic_of(*bag, options.joint_topic, instrument.name);
   if (!topic)
     throw InputError(options.joints, std::string("has no messages of ") + joint_type + ", expected the joints'");

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <optional>
 #include <utility>
 
 #include <fmt/format.h>
@@ -52,6 +53,13 @@ int found_in(const std::vector<cv::Mat>& frames, const Rig& rig, bool deinterlac
   }));
 }
 
+// The flaw of a frame that the tracker refused.
+std::optional<Status> flaw_in(const std::vector<Observation>& observations) {
+  for (const Observation& observation : observations)
+    if (observation.status == Status::damaged || observation.status == Status::few_colours) return observation.status;
+  return std::nullopt;
+}
+
 struct Reading {
   const char* cause_and_remedy;
   std::function<cv::Mat(const cv::Mat&)> read;
@@ -81,6 +89,10 @@ FrameDiagnosis::FrameDiagnosis(const Rig& rig, bool deinterlaced) : rig_(rig), d
 
 void FrameDiagnosis::add(const cv::Mat& bgr, const std::vector<Observation>& observations) {
   ++frames_;
+  if (const auto flaw = flaw_in(observations)) {
+    flawed_.add(*flaw);
+    return;
+  }
   bool any_ok = false, interlaced = false;
   for (std::size_t i = 0; i < observations.size(); ++i) {
     const Observation& observation = observations[i];
@@ -121,6 +133,8 @@ std::string FrameDiagnosis::cause() const {
 }
 
 std::string FrameDiagnosis::cause_in_frames() const {
+  if (2 * flawed_.all() > frames_) return flawed_.text(frames_);
+  if (kept_.empty()) return "";
   if (!deinterlaced_ && 2 * interlaced_ > frames_)
     return fmt::format("{} of {} frames are interlaced: --deinterlace tracks one field of each", interlaced_, frames_);
   if (std::all_of(kept_.begin(), kept_.end(), is_dark))

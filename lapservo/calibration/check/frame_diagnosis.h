@@ -6,14 +6,15 @@
 
 #include <opencv2/core.hpp>
 
+#include "lapservo/calibration/recording/frame_recording.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/vision/observation.h"
 
 namespace lapservo::internal {
 
-/// Why frames of a recording show no instrument of a rig, or an instrument that misses the rig's RCM. Frames are added
-/// as they are tracked; a few of those without a result are kept and tried again in other readings (red and blue
-/// exchanged, mirrored) when text() or cause() is called.
+/// Why frames of a recording are flawed, show no instrument of a rig, or an instrument that misses the rig's RCM.
+/// Frames are added as they are tracked; a few of those without a result are kept and tried again in other readings
+/// (red and blue exchanged, mirrored) when text() or cause() is called.
 class FrameDiagnosis {
  public:
   /// `deinterlaced`: one field of each frame is tracked.
@@ -41,6 +42,7 @@ class FrameDiagnosis {
   Rig rig_;
   bool deinterlaced_;
   int frames_ = 0, interlaced_ = 0;
+  FlawedFrames flawed_;
   std::map<std::string, Seen> seen_;
   std::vector<cv::Mat> kept_;
   int without_result_ = 0;  ///< frames

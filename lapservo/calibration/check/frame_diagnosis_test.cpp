@@ -89,6 +89,21 @@ TEST_F(FrameDiagnosisTest, NamesDeinterlacing) {
   expect_names(diagnosis.text(), "--deinterlace");
 }
 
+TEST_F(FrameDiagnosisTest, NamesFlawedFramesBeforeAllElse) {
+  const cv::Mat black = cv::Mat::zeros(rig.camera.height_px, rig.camera.width_px, CV_8UC3);
+  Tracker tracker(rig);
+  for (const auto& [flaw, said] : {std::pair{Status::damaged, "20 of 20 frames are damaged: "},
+                                   {Status::few_colours, "20 of 20 frames have no more colours than a palette"}}) {
+    FrameDiagnosis diagnosis(rig);
+    for (int i = 0; i < 20; ++i) diagnosis.add(black, tracker.refuse(flaw));
+    EXPECT_EQ(diagnosis.text().rfind(said, 0), 0U) << diagnosis.text();
+    EXPECT_EQ(diagnosis.cause(), "; " + diagnosis.text());
+  }
+  FrameDiagnosis half(rig);
+  for (int i = 0; i < 20; ++i) half.add(black, i % 2 == 0 ? tracker.refuse(Status::damaged) : tracker.track(black));
+  expect_names(half.text(), "nearly black");
+}
+
 TEST_F(FrameDiagnosisTest, SaysByHowMuchTheShaftMissesTheRcm) {
   Rig shifted = rig;
   shifted.instruments[0].camera_from_rcm->translation += Eigen::Vector3d(0.02, 0.02, 0);

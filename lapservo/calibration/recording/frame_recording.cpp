@@ -10,6 +10,13 @@
 
 namespace lapservo::internal {
 
+std::string FlawedFrames::text(int frames) const {
+  if (damaged >= few_colours)
+    return fmt::format("{} of {} frames are damaged: repair what carries them, or record them again", damaged, frames);
+  return fmt::format("{} of {} frames have no more colours than a palette: record them in true colour, not indexed",
+                     few_colours, frames);
+}
+
 std::string FramesRead::damaged() const {
   return flawed ? fmt::format(" ({} are damaged)", flawed) : "";
 }
@@ -28,6 +35,7 @@ FramesRead read_frames(const FrameRecording& recording, const Rig& rig, int ever
   const bool deinterlace = recording.deinterlace || rig.camera.deinterlace;
   EvenField field(rig.camera.response);
   FramesRead frames;
+  FlawedFrames flawed;
   int read = 0;
   while (!(frames.stopped = watch.stopped())) {
     const auto frame = source.next();
@@ -36,6 +44,7 @@ FramesRead read_frames(const FrameRecording& recording, const Rig& rig, int ever
     if (read++ % every != 0) continue;
     if (frame->flaw) {
       ++frames.flawed;
+      flawed.add(*frame->flaw);
       continue;
     }
     ++frames.looked_at;
@@ -43,6 +52,7 @@ FramesRead read_frames(const FrameRecording& recording, const Rig& rig, int ever
     watch.tell(source.frame_count(), read,
                look(deinterlace ? field.of(frame->bgr).clone() : frame->bgr, frame->time_s));
   }
+  if (flawed.all() > 0 && frames.looked_at == 0) throw InputError(recording.name, flawed.text(flawed.all()));
   frames.complaint = source.complaint();
   return frames;
 }

@@ -30,6 +30,16 @@ struct JobWatch {
   }
 };
 
+/// Frames in which nothing is to be measured: see Frame::flaw.
+struct FlawedFrames {
+  int damaged = 0, few_colours = 0;
+
+  void add(Status flaw) { ++(flaw == Status::few_colours ? few_colours : damaged); }
+  int all() const { return damaged + few_colours; }
+  /// How many of so many frames they are, the cause and its remedy; of the more frequent flaw.
+  std::string text(int frames) const;
+};
+
 /// Counts of a recording's frames.
 struct FramesRead {
   int looked_at = 0, flawed = 0;
@@ -46,7 +56,7 @@ void check_frame_size(const Frame& frame, const std::string& recording, const cv
                       const std::string& whose);
 
 /// Shows every `every`-th frame to `look`, as the tracker would see it, with its time; `look` may keep it, and returns
-/// a remark beside the progress. Throws InputError at a frame that is not of the rig's size.
+/// a remark beside the progress. Throws InputError at a frame that is not of the rig's size, and where all are flawed.
 FramesRead read_frames(const FrameRecording& recording, const Rig& rig, int every, const JobWatch& watch,
                        const std::function<std::string(const cv::Mat&, double)>& look);
 

@@ -1,10 +1,13 @@
 #include "lapservo/calibration/recording/frame_recording.h"
 
 #include <optional>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "lapservo/testing/input_error.h"
 #include "lapservo/testing/scenes.h"
 
 namespace lapservo::internal {
@@ -45,6 +48,36 @@ TEST(FrameRecording, FramesThatWereShownStayAsTheyAre) {
                 cv::Scalar(10.0 + static_cast<double>(i), 10.0 + static_cast<double>(i), 10.0 + static_cast<double>(i)))
           << deinterlace;
   }
+}
+
+class FlawedSource : public EvenFrames {
+ public:
+  FlawedSource(const cv::Size& size, std::vector<Status> flaws)
+      : EvenFrames(size, static_cast<int>(flaws.size())), flaws_(std::move(flaws)) {}
+  std::optional<Frame> next() override {
+    auto frame = EvenFrames::next();
+    if (frame && flaws_[static_cast<std::size_t>(frame->index)] != Status::ok)
+      frame->flaw = flaws_[static_cast<std::size_t>(frame->index)];
+    return frame;
+  }
+
+ private:
+  std::vector<Status> flaws_;
+};
+
+TEST(FrameRecording, OfFlawedFramesAloneIsRefused) {
+  const Rig rig = scenes::usual_rig();
+  const auto said = [&](const std::vector<Status>& flaws) {
+    FlawedSource source({rig.camera.width_px, rig.camera.height_px}, flaws);
+    return testing::input_error([&] {
+      read_frames({source, "frames"}, rig, 1, {}, [](const cv::Mat&, double) { return ""; });
+    });
+  };
+  EXPECT_EQ(said({4, Status::damaged}),
+            "frames: 4 of 4 frames are damaged: repair what carries them, or record them again");
+  EXPECT_EQ(said({Status::few_colours, Status::damaged, Status::few_colours}),
+            "frames: 2 of 3 frames have no more colours than a palette: record them in true colour, not indexed");
+  EXPECT_EQ(said({Status::few_colours, Status::ok, Status::damaged}), "");
 }
 
 }  // namespace

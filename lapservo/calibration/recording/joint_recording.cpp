@@ -46,6 +46,19 @@ std::optional<std::array<double, 4>> JointRecording::at(double at_s) const {
   return result;
 }
 
+std::string JointRecording::remark() const {
+  std::vector<std::string> parts;
+  const auto add = [&](int count, const char* what) {
+    if (count > 0) parts.push_back(fmt::format("{} {}", count, what));
+  };
+  add(repeated, "repeated readings"), add(of_other_arms, "readings of other arms' joints");
+  add(left_out, "readings without a stamp that goes with the others'"), add(no_numbers, "readings that are no numbers");
+  std::string text = parts.empty() ? "" : fmt::format("passed over: {}", fmt::join(parts, ", "));
+  if (steps == 0) return text;
+  return fmt::format("{}{}the clock of the joints was set {} times: times go on by the recorder's", text,
+                     text.empty() ? "" : "; ", steps);
+}
+
 JointRecording read_joint_recording(const std::filesystem::path& path, const Joints& joints) {
   return joint_recording_of(CsvTable::read(path), path.string(), joints);
 }

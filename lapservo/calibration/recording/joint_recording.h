@@ -17,9 +17,14 @@ struct JointRecording {
   std::vector<std::array<double, 4>> joints;  ///< as Joints::names has them; rad, rad, m, rad
   int repeated = 0;                           ///< readings passed over: the one before has the same stamp
   int of_other_arms = 0;                      ///< messages passed over: they lack a joint of the rig
+  int left_out = 0;                           ///< messages passed over: their stamps are none, late or stand out
+  int no_numbers = 0;                         ///< readings passed over: not finite
+  int steps = 0;                              ///< how often the clock that stamps them was set
 
   /// Between two rows, linearly; nullopt before the first and after the last one, and across pauses of half a second.
   std::optional<std::array<double, 4>> at(double time_s) const;
+  /// How many readings were passed over and why, and that the clock was set; empty where nothing is to be said.
+  std::string remark() const;
 };
 
 /// A CSV of `time_s` and a column a joint (docs/calibration.md). Throws InputError for columns that are missing,

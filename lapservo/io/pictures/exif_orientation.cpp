@@ -4,6 +4,7 @@
 #include <cstring>
 #include <string_view>
 
+#include "lapservo/io/pictures/jpeg_segments.h"
 #include "lapservo/io/pictures/tiff_directory.h"
 #include "lapservo/io/tables/numbers.h"
 
@@ -27,20 +28,11 @@ std::optional<std::size_t> of_exif(Bytes bytes) {
   return tiff_value(begins_with(bytes, prefix) ? from(bytes, prefix.size()) : bytes, orientation_tag);
 }
 
-// Segments up to the start of the scan: FF, a marker, a length that counts itself.
+// Segments up to the start of the scan.
 std::optional<std::size_t> of_jpeg(Bytes bytes) {
-  const Numbers numbers{bytes, true};
-  for (std::size_t at = 2; at + 4 <= bytes.size();) {
-    const std::size_t marker = numbers.of(at + 1, 1), length = numbers.of(at + 2, 2);
-    if (bytes[at] != 0xff || marker == 0xff || marker == 0) {
-      ++at;  // fill bytes, or garbage that decoders step over
-      continue;
-    }
-    if (marker == 0xda) return std::nullopt;
-    const Bytes segment = from(bytes, at + 4);
-    if (marker == 0xe1 && begins_with(segment, "Exif")) return of_exif(segment);
-    at += marker >= 0xd0 && marker <= 0xd8 ? 2 : 2 + (length < 2 ? 2 : length);
-  }
+  for (auto segment = jpeg_segment(bytes, 2); segment && segment->marker != 0xda;
+       segment = jpeg_segment(bytes, segment->end))
+    if (segment->marker == 0xe1 && begins_with(segment->content, "Exif")) return of_exif(segment->content);
   return std::nullopt;
 }
 

@@ -4,11 +4,14 @@
 #include <csetjmp>
 #include <cstddef>
 #include <cstdio>
+#include <jerror.h>
 #include <jpeglib.h>
-#include <vector>
+#include <optional>
+#include <utility>
 
 #include "lapservo/io/pictures/jpeg_blocks.h"
 #include "lapservo/io/pictures/jpeg_dc_shift.h"
+#include "lapservo/io/pictures/jpeg_strays.h"
 
 namespace lapservo::internal {
 namespace {
@@ -22,6 +25,7 @@ struct Decoder {
   jpeg_progress_mgr progress;
   std::jmp_buf leave;
   std::array<char, JMSG_LENGTH_MAX> complaint;
+  bool has_strays;  // bytes before a marker within the scan, or no end marker
 };
 
 Decoder& decoder_of(j_common_ptr info) {
@@ -33,8 +37,19 @@ void keep_complaint(j_common_ptr info) {
   if (complaint[0] == '\0') info->err->format_message(info, complaint.data());
 }
 
+// Whether a message may be one of bytes that belong to no block: see jpeg_strays.h.
+bool is_of_strays(j_common_ptr info) {
+  const int message = info->err->msg_code;
+  return decoder_of(info).info.input_scan_number > 0 && (message == JWRN_EXTRANEOUS_DATA || message == JWRN_JPEG_EOF);
+}
+
 void on_message(j_common_ptr info, int level) {
-  if (level < 0) keep_complaint(info);
+  if (level >= 0) return;
+  if (is_of_strays(info)) {
+    decoder_of(info).has_strays = true;
+  } else {
+    keep_complaint(info);
+  }
 }
 
 void on_jpeg_error(j_common_ptr info) {
@@ -116,8 +131,12 @@ std::string shift_complaint(const Blocks& blocks) {
   return {};
 }
 
-std::string complaint_of(const Decoder& decoder, const Blocks& blocks) {
-  return decoder.complaint[0] != '\0' ? std::string(decoder.complaint.data()) : shift_complaint(blocks);
+CheckedJpeg checked(const Decoder& decoder, const Blocks& blocks, std::span<const std::uint8_t> bytes) {
+  if (decoder.complaint[0] != '\0') return {decoder.complaint.data(), {}};
+  std::optional<std::vector<std::uint8_t>> clean(std::in_place);
+  if (decoder.has_strays) clean = jpeg_without_strays(bytes);
+  if (!clean) return {"data that belong to no block, or blocks without data", {}};
+  return {shift_complaint(blocks), std::move(*clean)};
 }
 
 }  // namespace
@@ -128,16 +147,16 @@ DecodedPicture decode_jpeg(std::span<const std::uint8_t> bytes) {
   DecodedPicture picture;
   read_picture(decoder, bytes, blocks, picture.bgr);
   jpeg_destroy_decompress(&decoder.info);
-  picture.complaint = complaint_of(decoder, blocks);
+  picture.complaint = checked(decoder, blocks, bytes).complaint;
   return picture;
 }
 
-std::string jpeg_complaint(std::span<const std::uint8_t> bytes) {
+CheckedJpeg check_jpeg(std::span<const std::uint8_t> bytes) {
   Decoder decoder{};
   Blocks blocks;
   read_blocks(decoder, bytes, blocks);
   jpeg_destroy_decompress(&decoder.info);
-  return complaint_of(decoder, blocks);
+  return checked(decoder, blocks, bytes);
 }
 
 }  // namespace lapservo::internal

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <vector>
 
 #include <opencv2/core.hpp>
 
@@ -15,11 +16,16 @@ struct DecodedPicture {
   std::string complaint;
 };
 
-/// By libjpeg, whose warnings OpenCV swallows, and as jpeg_complaint() has it.
+/// By libjpeg, whose warnings OpenCV swallows, and as check_jpeg() has it.
 DecodedPicture decode_jpeg(std::span<const std::uint8_t> bytes);
 
-/// The decoder's complaint when it reads the coefficients only, in a third of the time; or, without a complaint, a
-/// defect that no camera makes: colours that are shifted from some block on (jpeg_dc_shift.h).
-std::string jpeg_complaint(std::span<const std::uint8_t> bytes);
+struct CheckedJpeg {
+  std::string complaint;            ///< the decoder's; or a defect that no camera makes; empty: none
+  std::vector<std::uint8_t> clean;  ///< where bytes belong to no block: the JPEG without them (jpeg_strays.h)
+};
+
+/// Reads the coefficients only, in a third of the time. Looks for colours that are shifted from some block on
+/// (jpeg_dc_shift.h). Bytes that belong to no block and a missing end marker are no complaint: they cost no pixel.
+CheckedJpeg check_jpeg(std::span<const std::uint8_t> bytes);
 
 }  // namespace lapservo::internal

@@ -1,9 +1,14 @@
 #include "lapservo/io/pictures/png_picture.h"
 
 #include <algorithm>
+#include <bit>
+#include <cmath>
+#include <optional>
 #include <png.h>
 #include <string_view>
 #include <vector>
+
+#include "lapservo/io/tables/numbers.h"
 
 namespace lapservo::internal {
 namespace {
@@ -34,27 +39,46 @@ void read_bytes(png_structp png, png_bytep out, std::size_t count) {
   source.left = source.left.subspan(count);
 }
 
-void convert_to_bgr8(png_structp png) {
+// The content of a chunk before the data; empty where there is none.
+std::span<const std::uint8_t> chunk_in(std::span<const std::uint8_t> png, std::string_view wanted) {
+  constexpr std::size_t signature = 8, around = 12;  // length, name and checksum
+  const Numbers numbers{png, true};
+  for (std::size_t at = signature; at + around <= png.size();) {
+    const std::string_view name(reinterpret_cast<const char*>(&png[at + 4]), 4);
+    const std::size_t length = numbers.of(at, 4);
+    if (name == "IDAT" || length > png.size() - at - around) break;
+    if (name == wanted) return png.subspan(at + 8, length);
+    at += around + length;
+  }
+  return {};
+}
+
+void convert_to_bgr(png_structp png, bool deep) {
   png_set_crc_action(png, PNG_CRC_ERROR_QUIT, PNG_CRC_ERROR_QUIT);
   png_set_palette_to_rgb(png);
   png_set_expand_gray_1_2_4_to_8(png);
   png_set_gray_to_rgb(png);
-  png_set_scale_16(png);
+  if (deep) {
+    png_set_expand_16(png);
+    if constexpr (std::endian::native == std::endian::little) png_set_swap(png);
+  } else {
+    png_set_scale_16(png);
+  }
   png_set_strip_alpha(png);
   png_set_bgr(png);
   png_set_interlace_handling(png);
 }
 
 // The library leaves by longjmp: nothing here may have a destructor.
-void read_rows(png_structp png, png_infop info, cv::Mat& image, std::vector<png_bytep>& rows) {
+void read_rows(png_structp png, png_infop info, cv::Mat& image, std::vector<png_bytep>& rows, bool deep) {
   if (setjmp(png_jmpbuf(png)) != 0) return;
   png_read_info(png, info);
-  convert_to_bgr8(png);
+  convert_to_bgr(png, deep);
   png_read_update_info(png, info);
-  if (png_get_rowbytes(png, info) != std::size_t{3} * png_get_image_width(png, info))
+  if (png_get_rowbytes(png, info) != std::size_t{deep ? 6U : 3U} * png_get_image_width(png, info))
     png_error(png, "is of no kind known");
   image.create(static_cast<int>(png_get_image_height(png, info)), static_cast<int>(png_get_image_width(png, info)),
-               CV_8UC3);
+               deep ? CV_16UC3 : CV_8UC3);
   image.setTo(0);
   rows.resize(static_cast<std::size_t>(image.rows));
   for (int v = 0; v < image.rows; ++v) rows[static_cast<std::size_t>(v)] = image.ptr(v);
@@ -64,20 +88,38 @@ void read_rows(png_structp png, png_infop info, cv::Mat& image, std::vector<png_
 
 }  // namespace
 
+// A profile or sRGB overrules gAMA. Some 1/2.2 stands for sRGB everywhere.
+std::optional<Transfer> png_transfer(std::span<const std::uint8_t> png) {
+  constexpr std::uint8_t linear = 8, pq = 16, hlg = 18;
+  if (const auto code = chunk_in(png, "cICP"); code.size() == 4) {
+    if (code[1] == hlg) return Transfer{Transfer::Kind::hlg};
+    if (code[1] == pq) return Transfer{Transfer::Kind::pq};
+    return code[1] == linear ? std::optional(Transfer{}) : std::nullopt;
+  }
+  const auto gamma = chunk_in(png, "gAMA");
+  if (gamma.size() != 4 || !chunk_in(png, "iCCP").empty() || !chunk_in(png, "sRGB").empty()) return std::nullopt;
+  const double exponent = static_cast<double>(Numbers{gamma, true}.of(0, 4)) * 1e-5;
+  constexpr double usual = 1 / 2.2, tolerance = 0.03, least = 0.1, most = 10;
+  if (!(exponent >= least && exponent <= most) || std::abs(exponent - usual) <= tolerance) return std::nullopt;
+  return Transfer{Transfer::Kind::power, 1 / exponent};
+}
+
 DecodedPicture decode_png(std::span<const std::uint8_t> bytes) {
   Source source{bytes, {}};
   png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &source, on_png_error, on_warning);
   png_infop info = png ? png_create_info_struct(png) : nullptr;
   DecodedPicture picture;
+  const std::optional<Transfer> transfer = png_transfer(bytes);
   std::vector<png_bytep> rows;
   if (info) {
     png_set_read_fn(png, &source, read_bytes);
-    read_rows(png, info, picture.bgr, rows);
+    read_rows(png, info, picture.bgr, rows, transfer.has_value());
   } else {
     source.keep("not enough memory");
   }
   png_destroy_read_struct(&png, &info, nullptr);
   picture.complaint = source.complaint;
+  if (transfer && !picture.bgr.empty()) picture.bgr = srgb_of(picture.bgr, *transfer);
   return picture;
 }
 

@@ -1,14 +1,20 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include "lapservo/io/pictures/jpeg_picture.h"
+#include "lapservo/io/pictures/transfer.h"
 
 namespace lapservo::internal {
 
 /// By libpng, every checksum compared: grey repeated over the channels, palettes looked up, alpha dropped, 16 bits
-/// rounded to 8.
+/// rounded to 8, the transfer that it names undone.
 DecodedPicture decode_png(std::span<const std::uint8_t> bytes);
+
+/// By its chunks cICP or gAMA; nullopt for what cameras' responses are, and for what is no PNG. Its first bytes
+/// suffice.
+std::optional<Transfer> png_transfer(std::span<const std::uint8_t> bytes);
 
 }  // namespace lapservo::internal

@@ -66,13 +66,13 @@ Place place_in(ChromaSite site, const AVPixFmtDescriptor& format, bool by_field,
   return place;
 }
 
-libav::Scaler scaler_of(const cv::Size& size, AVPixelFormat format, const Place& chroma, bool to_planes) {
+libav::Scaler scaler_of(const cv::Size& size, AVPixelFormat format, const Place& chroma, AVPixelFormat to) {
   libav::Scaler scaler(sws_alloc_context());
   if (!scaler) return nullptr;
   const auto set = [&](const char* name, int value) { av_opt_set_int(scaler.get(), name, value, 0); };
   set("srcw", size.width), set("srch", size.height), set("src_format", format);
   set("dstw", size.width), set("dsth", size.height);
-  set("dst_format", to_planes ? AV_PIX_FMT_GBRP : AV_PIX_FMT_BGR24);
+  set("dst_format", to);
   // Without SWS_ACCURATE_RND chroma is repeated. SWS_BICUBIC overshoots where an encoder's filter does already
   // (docs/notes/cameras.md).
   set("sws_flags", SWS_BILINEAR | SWS_ACCURATE_RND | SWS_FULL_CHR_H_INT | SWS_FULL_CHR_H_INP);
@@ -87,9 +87,15 @@ void set_colours(SwsContext& scaler, const YuvColours& colours) {
 }
 
 // With room for what swscale writes beyond the ends of rows.
-cv::Mat plane_of(const cv::Size& size) {
+cv::Mat plane_of(const cv::Size& size, int depth) {
   constexpr int step = 64;
-  return cv::Mat(size.height, (size.width / step + 2) * step, CV_8UC1).colRange(0, size.width);
+  return cv::Mat(size.height, (size.width / step + 2) * step, CV_MAKETYPE(depth, 1)).colRange(0, size.width);
+}
+
+// Planes or BGR; of 16 bits where a transfer is undone.
+AVPixelFormat target_of(bool to_planes, bool deep) {
+  if (to_planes) return deep ? AV_PIX_FMT_GBRP16 : AV_PIX_FMT_GBRP;
+  return deep ? AV_PIX_FMT_BGR48 : AV_PIX_FMT_BGR24;
 }
 
 }  // namespace
@@ -118,15 +124,17 @@ bool BgrConverter::set_up(const Source& source) {
   scalers_.clear();
   const AVPixFmtDescriptor& format = *av_pix_fmt_desc_get(source.format);
   const int fields = source.by_field ? 2 : 1;
+  const bool deep = source.colours.transfer.has_value();
+  const AVPixelFormat to = target_of(has_chroma(format), deep);
   const cv::Size size(source.width_px, source.height_px), scaled(size.width, size.height / fields);
   for (int field = 0; field < fields; ++field) {
     const Place chroma = place_in(source.colours.chroma, format, source.by_field, field);
-    libav::Scaler scaler = scaler_of(scaled, source.format, chroma, has_chroma(format));
+    libav::Scaler scaler = scaler_of(scaled, source.format, chroma, to);
     if (!scaler) return false;
     if (!is_rgb(format)) set_colours(*scaler, source.colours);
     scalers_.push_back(std::move(scaler));
   }
-  for (cv::Mat& plane : planes_) plane = has_chroma(format) ? plane_of(size) : cv::Mat();
+  for (cv::Mat& plane : planes_) plane = has_chroma(format) ? plane_of(size, deep ? CV_16U : CV_8U) : cv::Mat();
   source_ = source;
   return true;
 }
@@ -139,12 +147,14 @@ bool BgrConverter::convert(const AVFrame& frame, const YuvColours& colours, bool
   const Source source{frame.width, frame.height, format, colours, split};
   if (source != source_ && !set_up(source)) return false;
   bgr.create(frame.height, frame.width, CV_8UC3);
+  cv::Mat deep = colours.transfer ? cv::Mat(bgr.size(), CV_16UC3) : cv::Mat();
+  cv::Mat& whole = colours.transfer ? deep : bgr;
   const bool to_planes = !planes_[0].empty();
   const int fields = static_cast<int>(scalers_.size());
   for (int field = 0; field < fields; ++field) {
     std::array<const std::uint8_t*, 4> from{};
-    std::array<std::uint8_t*, 4> to{to_planes ? nullptr : bgr.ptr(field)};
-    std::array<int, 4> from_steps{}, to_steps{fields * static_cast<int>(bgr.step)};
+    std::array<std::uint8_t*, 4> to{to_planes ? nullptr : whole.ptr(field)};
+    std::array<int, 4> from_steps{}, to_steps{fields * static_cast<int>(whole.step)};
     for (std::size_t i = 0; i < 4; ++i) {
       from[i] = frame.data[i] ? frame.data[i] + field * frame.linesize[i] : nullptr;
       from_steps[i] = fields * frame.linesize[i];
@@ -155,7 +165,8 @@ bool BgrConverter::convert(const AVFrame& frame, const YuvColours& colours, bool
     sws_scale(scalers_[static_cast<std::size_t>(field)].get(), from.data(), from_steps.data(), 0, frame.height / fields,
               to.data(), to_steps.data());
   }
-  if (to_planes) cv::merge(std::array{planes_[1], planes_[0], planes_[2]}, bgr);
+  if (to_planes) cv::merge(std::array{planes_[1], planes_[0], planes_[2]}, whole);
+  if (colours.transfer) srgb_of(deep, *colours.transfer).copyTo(bgr);
   return true;
 }
 

@@ -18,8 +18,8 @@ AVPixelFormat pixel_format_of(const AVFrame& frame);
 /// samples that are repeated instead shift colour boundaries by up to half a pixel.
 class BgrConverter {
  public:
-  /// `colours`: of frames that hold no RGB. `by_field`: the rows are two fields', and chroma that has fewer rows
-  /// (4:2:0) belongs to each by itself. False for pixels that swscale can't read.
+  /// `colours`: of frames that hold RGB only the transfer. `by_field`: the rows are two fields', and chroma that has
+  /// fewer rows (4:2:0) belongs to each by itself. False for pixels that swscale can't read.
   bool convert(const AVFrame& frame, const YuvColours& colours, bool by_field, cv::Mat& bgr);
 
  private:

@@ -102,6 +102,29 @@ TEST(VideoWithoutTags, IsReadByItsHeightOrItsWriterOrAsGiven) {
       "chroma location: is mid, expected left, centre or top-left");
 }
 
+// Whoever wrote them: editors write recorders' videos anew.
+TEST(VideoWithoutTags, OfARecordersCodecIsReadByItsHeight) {
+  const testing::TemporaryFolder folder;
+  int written = 0;
+  for (const char* codec : {"prores_ks -profile:v 3", "dnxhd -profile:v dnxhr_hq",
+                            "cfhd -quality film3+ -pix_fmt yuv422p10le", "v210", "jpeg2000 -pix_fmt yuv422p"})
+    for (const auto& [matrix, height_px] : {std::pair{"bt709", 720}, {"bt709", 1088}, {"bt601", 480}}) {
+      const std::string path = (folder / "a.mov").string();
+      if (!testing::write_by_ffmpeg(path, patches_of(height_px),
+                                    std::string("-vf scale=out_range=tv:flags=accurate_rnd:out_color_matrix=") +
+                                        matrix + ",setparams=colorspace=unknown -c:v " + codec))
+        continue;
+      ++written;
+      SCOPED_TRACE(std::string(codec) + ", " + std::to_string(height_px) + " rows");
+      const auto source = open_frame_source(path, 25);
+      EXPECT_EQ(source->remark().find("read as Rec. 709") != std::string::npos, height_px >= 720) << source->remark();
+      const auto frame = source->next();
+      ASSERT_TRUE(frame);
+      expect_patches(frame->bgr, 4);
+    }
+  if (written == 0) GTEST_SKIP() << "no ffmpeg";
+}
+
 // Red in the rows of one field, blue in those of the other.
 TEST(VideoFields, HaveTheirOwnChroma) {
   const testing::TemporaryFolder folder;

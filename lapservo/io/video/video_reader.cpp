@@ -1,11 +1,14 @@
 #include "lapservo/io/video/video_reader.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstdint>
+#include <fstream>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 extern "C" {
 #include <libavutil/display.h>
@@ -13,9 +16,11 @@ extern "C" {
 }
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "lapservo/core/error.h"
 #include "lapservo/io/pictures/jpeg_picture.h"
+#include "lapservo/io/tables/numbers.h"
 #include "lapservo/io/video/bgr_converter.h"
 #include "lapservo/io/video/libav.h"
 #include "lapservo/io/video/yuv_colours.h"
@@ -28,6 +33,32 @@ constexpr std::int64_t transport_packet_bytes = 188;
 
 int past(void* deadline) {
   return Clock::now() > *static_cast<Clock::time_point*>(deadline) ? 1 : 0;
+}
+
+// Whether it begins with a box of MP4 or QuickTime, and lacks the one that says where its frames are.
+bool lacks_index(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::array<std::uint8_t, 16> head{};
+  bool is_mp4 = false;
+  for (std::uint64_t at = 0;
+       file.seekg(static_cast<std::streamoff>(at)) && file.read(reinterpret_cast<char*>(head.data()), 16);) {
+    const Numbers numbers{head, true};
+    const std::string_view name(reinterpret_cast<const char*>(&head[4]), 4);
+    if (name == "moov") return false;
+    is_mp4 = is_mp4 || name == "ftyp" || name == "mdat";
+    const std::uint64_t size = numbers.of(0, 4) == 1 ? numbers.of(8, 8) : numbers.of(0, 4);
+    if (size < 8 || !is_mp4) break;
+    at += size;
+  }
+  return is_mp4;
+}
+
+void refuse_known(const std::filesystem::path& path) {
+  if (lacks_index(path))
+    throw InputError(
+        path.string(),
+        "has no index (moov), as of a recorder that was switched off: untrunc GOOD.mp4 FILE repairs it by a "
+        "whole video of the same recorder");
 }
 
 bool turned(const AVStream& stream) {
@@ -78,11 +109,12 @@ class VideoReader::State {
   }
 
   const std::string& remark() const { return remark_; }
+  bool is_srgb() const { return is_srgb_; }
 
   std::string complaint() const {
-    constexpr double slack = 0.01;  // durations are rounded, and sound may last longer
-    const double frames_s = 2 / frames_per_second();
-    if (const auto announced_s = duration_s(); announced_s && end_s_ < (1 - slack) * *announced_s - frames_s)
+    constexpr double slack = 0.01;  // durations are rounded
+    const double frames_s = 2 / frames_per_second(), read_s = std::max(end_s_, end_of_all_s_);
+    if (const auto announced_s = duration_s(); announced_s && read_s < (1 - slack) * *announced_s - frames_s)
       return fmt::format("ends early, after {:.2f} of {:.2f} s", end_s_, *announced_s);
     const bool transport = std::string_view(format_->iformat->name) == "mpegts";
     if (transport && format_->pb && avio_size(format_->pb) % transport_packet_bytes != 0) return "ends within a frame";
@@ -100,6 +132,7 @@ class VideoReader::State {
     const bool opened = avformat_open_input(&format, url().c_str(), nullptr, &options) == 0;
     av_dict_free(&options);
     format_.reset(opened ? format : nullptr);
+    if (!opened && kind_ == Kind::file) refuse_known(source_);
     if (!opened || avformat_find_stream_info(format, nullptr) < 0)
       throw InputError(source_, kind_ == Kind::file ? "can't be read, expected an image or a video"
                                                     : "can't be opened, expected a camera or stream");
@@ -125,6 +158,7 @@ class VideoReader::State {
     decoder_->thread_count = codec->id == AV_CODEC_ID_MPEG2VIDEO ? 0 : 1;
     decoder_->thread_type = FF_THREAD_SLICE;
     decoder_->err_recognition = AV_EF_CRCCHECK | AV_EF_BITSTREAM | AV_EF_BUFFER | AV_EF_EXPLODE;
+    decoder_->framerate = {0, 1};  // what the frames say, not the demuxer
     if (codec->id == AV_CODEC_ID_H264) decoder_->err_recognition |= AV_EF_AGGRESSIVE;
     if (avcodec_open2(decoder_.get(), codec, nullptr) < 0)
       throw InputError(source_, "can't be decoded, expected a video");
@@ -135,8 +169,10 @@ class VideoReader::State {
     if (kind_ == Kind::stream) deadline_ = Clock::now() + patience_;
     while (av_read_frame(format_.get(), packet_.get()) >= 0) {
       const bool ours = packet_->stream_index == stream_->index;
+      look_at_end(*packet_);
       if (ours && packets_++ == 0) of_software_ = names_software();
-      if (ours && ((packet_->flags & AV_PKT_FLAG_CORRUPT) != 0 || is_damaged_jpeg(*packet_))) tainted_ = true;
+      if (ours && (packet_->flags & AV_PKT_FLAG_CORRUPT) != 0) tainted_ = true;
+      if (ours && stream_->codecpar->codec_id == AV_CODEC_ID_MJPEG) check_jpeg_packet();
       const int sent = ours ? avcodec_send_packet(decoder_.get(), packet_.get()) : 0;
       av_packet_unref(packet_.get());
       if (ours) return sent >= 0 || sent == AVERROR(EAGAIN);
@@ -144,8 +180,19 @@ class VideoReader::State {
     return avcodec_send_packet(decoder_.get(), nullptr) >= 0;
   }
 
+  // Without a count of frames the duration may be that of sound or subtitles, or include a time before the video
+  // begins.
+  void look_at_end(const AVPacket& packet) {
+    if (stream_->nb_frames > 0 || packet.pts == AV_NOPTS_VALUE) return;
+    const double begin_s =
+        format_->start_time == AV_NOPTS_VALUE ? 0 : static_cast<double>(format_->start_time) / AV_TIME_BASE;
+    const double unit_s = av_q2d(format_->streams[packet.stream_index]->time_base);
+    end_of_all_s_ = std::max(end_of_all_s_, static_cast<double>(packet.pts + packet.duration) * unit_s - begin_s);
+  }
+
   // By the first packet, what precedes it or the container.
   bool names_software() const {
+    if (is_codec_of_recorders(stream_->codecpar->codec_id)) return false;
     const auto names = [](const std::uint8_t* data, int size) {
       constexpr int most = 4096;
       return data && size > 0 && names_software_encoder({data, static_cast<std::size_t>(std::min(most, size))});
@@ -156,10 +203,16 @@ class VideoReader::State {
            (encoder && std::string_view(encoder->value).starts_with("Lavc"));
   }
 
-  // FFmpeg's decoder of motion JPEG says nothing where the data go on after the last row: rows are shifted then.
-  bool is_damaged_jpeg(const AVPacket& packet) const {
-    return stream_->codecpar->codec_id == AV_CODEC_ID_MJPEG &&
-           !jpeg_complaint({packet.data, static_cast<std::size_t>(std::max(0, packet.size))}).empty();
+  // FFmpeg's decoder of motion JPEG says nothing where the data go on after the last row: rows are shifted then. Bytes
+  // before a restart marker shift them, too.
+  void check_jpeg_packet() {
+    const auto [complaint, clean] = check_jpeg({packet_->data, static_cast<std::size_t>(std::max(0, packet_->size))});
+    tainted_ = tainted_ || !complaint.empty();
+    const int size = static_cast<int>(clean.size()), more = size - packet_->size;
+    if (clean.empty() || av_packet_make_writable(packet_.get()) < 0) return;
+    if (more > 0 && av_grow_packet(packet_.get(), more) < 0) return;
+    std::copy(clean.begin(), clean.end(), packet_->data);
+    av_shrink_packet(packet_.get(), size);
   }
 
   // Frames predicted from a damaged one are damaged too, up to the next that stands alone.
@@ -207,6 +260,28 @@ class VideoReader::State {
     return std::nullopt;
   }
 
+  void note_remarks(const YuvColours& colours) {
+    is_srgb_ = colours.transfer.has_value();
+    std::vector<std::string> remarks;
+    if (colours.transfer) remarks.push_back(remark_on_transfer(*colours.transfer));
+    if (!given_.matrix) remarks.push_back(remark_on_matrix(*frame_, of_software_));
+    if (has_assumed_rate())
+      remarks.push_back(
+          fmt::format("names no times and no rate: read as {:.6g} frames/s (ffmpeg -framerate RATE -i IN -c copy "
+                      "OUT.mp4 writes them)",
+                      frames_per_second()));
+    std::erase(remarks, "");
+    remark_ = fmt::format("{}", fmt::join(remarks, "; "));
+  }
+
+  // Data without a container, whose frames do not say it either.
+  bool has_assumed_rate() const {
+    const AVInputFormat& container = *format_->iformat;
+    const bool has_times =
+        (container.flags & AVFMT_NOTIMESTAMPS) == 0 && !std::string_view(container.name).ends_with("_pipe");
+    return kind_ == Kind::file && !has_times && decoder_->framerate.num <= 0;
+  }
+
   // By each frame's own tags: a stream's may change.
   void convert() {
     const auto colours = yuv_colours_of(*frame_, stream_->codecpar->codec_id, of_software_, given_);
@@ -214,9 +289,11 @@ class VideoReader::State {
       throw InputError(source_, "colour matrix", av_color_space_name(frame_->colorspace),
                        "bt709, smpte170m, bt470bg, bt2020nc, fcc or smpte240m (convert it: ffmpeg -i IN -vf "
                        "scale=out_color_matrix=bt709 -colorspace bt709 OUT)");
+    if (const std::string expected = expected_transfer(*frame_); !expected.empty())
+      throw InputError(source_, "transfer", av_color_transfer_name(frame_->color_trc), expected);
     if (!converter_.convert(*frame_, *colours, fields_, last_))
       throw InputError(source_, "has pixels of a kind that can't be converted, expected a video");
-    if (frames_ == 0 && !given_.matrix) remark_ = remark_on_matrix(*frame_, of_software_);
+    if (frames_ == 0) note_remarks(*colours);
   }
 
   std::string source_;
@@ -230,12 +307,14 @@ class VideoReader::State {
   bool fields_;
   GivenColours given_;
   std::string remark_;
+  bool is_srgb_ = false;
   bool of_software_ = false;  // a software encoder wrote the stream
   BgrConverter converter_;
   AVStream* stream_ = nullptr;
   cv::Mat last_;
   std::optional<double> time_s_;  // of the last frame, since the first
   double end_s_ = 0;              // of the last frame
+  double end_of_all_s_ = 0;       // of all streams, where they have one duration
   double first_s_ = 0;            // the first frame's stamp
   bool stamped_ = false;          // a frame had a stamp
   int packets_ = 0, frames_ = 0, damaged_ = 0;
@@ -259,6 +338,9 @@ double VideoReader::frames_per_second() const {
 }
 std::string VideoReader::remark() const {
   return state_->remark();
+}
+bool VideoReader::is_srgb() const {
+  return state_->is_srgb();
 }
 std::string VideoReader::complaint() const {
   return state_->complaint();

@@ -38,6 +38,8 @@ class VideoReader {
   double frames_per_second() const;
   /// After the first frame: FrameSource::remark().
   std::string remark() const;
+  /// After the first frame: FrameSource::is_srgb().
+  bool is_srgb() const;
   /// After the end: that the frames end before the duration that the container announces or within a frame, else empty.
   std::string complaint() const;
 

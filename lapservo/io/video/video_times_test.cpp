@@ -61,6 +61,41 @@ TEST(VideoTimes, AreWrittenAsTheyAreRead) {
   }
 }
 
+// Sound and subtitles before and after the video.
+TEST(VideoTimes, EndWithTheVideoWhateverLastsLonger) {
+  const testing::TemporaryFolder folder;
+  testing::write_file(folder / "a.srt",
+                      "1\n00:00:00,000 --> 00:00:01,000\nfirst\n\n2\n00:00:05,000 --> 00:00:09,000\nlast\n");
+  const std::string video = "-f lavfi -i testsrc=s=64x48:r=25:d=2 ";
+  const std::string late_video = "-f lavfi -itsoffset 3 -i testsrc=s=64x48:r=25:d=2 ";
+  const std::string sound = "-f lavfi -i sine=d=4 ", subtitles = "-i '" + (folder / "a.srt").string() + "' ";
+  int written = 0;
+  for (const auto& [name, arguments] : {std::pair{"a.mkv", video + sound},
+                                        {"a.webm", video + sound},
+                                        {"a.flv", video + sound + "-ar 44100 "},
+                                        {"a.wmv", video + sound},
+                                        {"a.mp4", video + sound},
+                                        {"a.mov", video + sound},
+                                        {"a.avi", video + sound},
+                                        {"a.ts", video + sound},
+                                        {"b.mkv", video + subtitles},
+                                        {"b.mp4", video + subtitles + "-c:s mov_text "},
+                                        {"c.mkv", late_video + sound},
+                                        {"c.webm", late_video + sound}}) {
+    if (!ffmpeg(arguments + "'" + (folder / name).string() + "'")) continue;  // an encoder is missing
+    ++written;
+    const TimesRead times = read_times(folder / name);
+    EXPECT_NEAR(static_cast<double>(times.s.size()), 50, 2) << name;
+    EXPECT_EQ(times.complaint, "") << name;
+  }
+  if (written == 0) GTEST_SKIP() << "no ffmpeg";
+  for (const char* name : {"a.mkv", "a.webm", "a.flv"}) {
+    const std::string whole = testing::read_file(folder / name);
+    testing::write_file(folder / name, whole.substr(0, whole.size() * 4 / 5));
+    EXPECT_NE(read_times(folder / name).complaint, "") << name << " that is cut";
+  }
+}
+
 // An edit list leaves out the frames before the cut that those after it are predicted from.
 TEST(VideoTimes, OfACutVideoBeginAtTheCut) {
   const testing::TemporaryFolder folder;

@@ -31,6 +31,15 @@ std::optional<YuvMatrix> matrix_of(AVColorSpace tag) {
   return found_in(matrices, tag);
 }
 
+// Others are as cameras encode light, which the rig's response describes.
+std::optional<Transfer> transfer_of(AVColorTransferCharacteristic tag) {
+  static const std::map<AVColorTransferCharacteristic, Transfer> transfers{
+      {AVCOL_TRC_LINEAR, {Transfer::Kind::power, 1}},
+      {AVCOL_TRC_ARIB_STD_B67, {Transfer::Kind::hlg}},
+      {AVCOL_TRC_SMPTE2084, {Transfer::Kind::pq}}};
+  return found_in(transfers, tag);
+}
+
 // Some cameras' streams say RGB of YUV.
 bool names_no_matrix(const AVFrame& frame) {
   return frame.colorspace == AVCOL_SPC_UNSPECIFIED || frame.colorspace == AVCOL_SPC_RESERVED ||
@@ -64,6 +73,31 @@ ChromaSite site_of(const AVFrame& frame, AVCodecID codec, bool from_rgb) {
 
 }  // namespace
 
+bool is_codec_of_recorders(AVCodecID codec) {
+  constexpr std::array codecs{AV_CODEC_ID_PRORES, AV_CODEC_ID_DNXHD, AV_CODEC_ID_CFHD,
+                              AV_CODEC_ID_HQX,    AV_CODEC_ID_V210,  AV_CODEC_ID_JPEG2000};
+  return std::find(codecs.begin(), codecs.end(), codec) != codecs.end();
+}
+
+std::string expected_transfer(const AVFrame& frame) {
+  const AVPixFmtDescriptor* const format = av_pix_fmt_desc_get(pixel_format_of(frame));
+  switch (frame.color_trc) {
+    case AVCOL_TRC_LOG:
+    case AVCOL_TRC_LOG_SQRT:
+    case AVCOL_TRC_SMPTE428:
+      return "bt709 or another of cameras (convert it: ffmpeg -i IN -vf zscale=transfer=bt709 OUT)";
+    case AVCOL_TRC_SMPTE2084:
+    case AVCOL_TRC_LINEAR:
+      return format && format->log2_chroma_w + format->log2_chroma_h > 0
+                 ? "bt709 or HLG, or chroma of full size (4:4:4): subsampled in PQ or linear light, it "
+                   "shifts boundaries of colours (set "
+                   "the recorder to SDR)"
+                 : "";
+    default:
+      return "";
+  }
+}
+
 bool names_software_encoder(std::span<const std::uint8_t> bytes) {
   using namespace std::string_view_literals;
   constexpr std::array names{"x264 - core"sv, "x265 (build"sv, "Lavc"sv};
@@ -87,7 +121,7 @@ GivenColours given_colours(const std::string& colour_matrix, const std::string& 
 
 std::optional<YuvColours> yuv_colours_of(const AVFrame& frame, AVCodecID codec, bool of_software,
                                          const GivenColours& given) {
-  if (is_rgb(frame)) return YuvColours();
+  if (is_rgb(frame)) return YuvColours{.transfer = transfer_of(frame.color_trc)};
   const bool from_rgb = of_software && names_no_matrix(frame);
   YuvColours colours;
   if (given.matrix) {
@@ -99,6 +133,7 @@ std::optional<YuvColours> yuv_colours_of(const AVFrame& frame, AVCodecID codec, 
   } else {
     return std::nullopt;
   }
+  colours.transfer = transfer_of(frame.color_trc);
   colours.full_range = pixel_format_of(frame) != frame.format || frame.color_range == AVCOL_RANGE_JPEG;
   colours.chroma = given.chroma.value_or(site_of(frame, codec, from_rgb));
   return colours;

@@ -2,8 +2,11 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 
 #include <opencv2/core.hpp>
+
+#include "lapservo/io/pictures/transfer.h"
 
 namespace lapservo::internal {
 
@@ -14,11 +17,12 @@ enum class YuvMatrix { bt601, bt709, bt2020, fcc, smpte240m };
 /// in which chroma has fewer samples than luma.
 enum class ChromaSite { left, centre, top_left, top, bottom_left, bottom };
 
-/// How luma and chroma become red, green and blue.
+/// How luma and chroma become red, green and blue, and these sRGB.
 struct YuvColours {
   YuvMatrix matrix = YuvMatrix::bt601;
   bool full_range = false;  ///< 0 to 255 and not 16 to 235
   ChromaSite chroma = ChromaSite::left;
+  std::optional<Transfer> transfer{};  ///< that is undone; none: values stay as they are
   bool operator==(const YuvColours&) const = default;
 };
 

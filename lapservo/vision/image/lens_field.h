@@ -6,15 +6,17 @@
 
 #include "lapservo/geometry/camera.h"
 #include "lapservo/geometry/field_of_view.h"
+#include "lapservo/geometry/invertible.h"
 
 namespace lapservo::internal {
 
-/// Which points a camera can show: those before it, hardly farther from its axis than the image's corners. Beyond, a
-/// lens's distortion is not known: it folds places back into the image.
+/// Which points a camera can show: those before it, hardly farther from its axis than the image's corners, or than
+/// where its distortion folds before them. Beyond, a lens's distortion is not known: it folds places back into the
+/// image.
 class LensField {
  public:
   explicit LensField(const Camera& camera) {
-    constexpr double beyond_corner = 1.1;
+    const double beyond_corner = is_invertible_everywhere(camera) ? 1.1 : 1;
     const double widest = beyond_corner * std::tan(half_field_rad(camera));
     widest_squared_ = widest * widest;
   }

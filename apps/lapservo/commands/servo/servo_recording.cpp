@@ -10,6 +10,7 @@
 #include "apps/lapservo/cli/interrupt.h"
 #include "apps/lapservo/cli/progress.h"
 #include "apps/lapservo/commands/servo/servo_output.h"
+#include "apps/lapservo/inputs/frame_input.h"
 #include "recordings/open_bag.h"
 #include "recordings/replayed_run.h"
 
@@ -62,6 +63,7 @@ int decide_on_recording(const ServoOptions& options) {
   const Trajectory trajectory = trajectory_of(options);
 
   auto bag = open_bag(options.replay);
+  say_remark(options.replay, bag->remark());
   ReplayedRun recorded(std::move(bag), options.image_topic, options.joint_topic, rig.instruments.front().name,
                        joints_of(options, rig));
   if (const double lead_s = recorded.arm_clock_lead_s(); std::abs(lead_s) > 0.3)
@@ -76,8 +78,8 @@ int decide_on_recording(const ServoOptions& options) {
   lapservo::run(recorded.arm(), recorded.images(), recorded.clock(), config, trajectory, asked_s, watcher);
   std::printf("decided on %.1f s of a recording, %d images and the joints; nothing was sent%s\n", watcher.duration_s(),
               recorded.images_given(), watcher.summary().holds_text().c_str());
-  if (const std::string complaint = recorded.complaint(); !complaint.empty())
-    std::fprintf(stderr, "lapservo: %s: %s\n", options.replay.c_str(), complaint.c_str());
+  say_remark(options.replay, recorded.complaint());
+  say_remark(options.replay, recorded.joint_remark());
   const bool logged = !folder || folder->commit();
   if (folder && logged) std::printf("log, rig and controller: %s\n", options.out.c_str());
   return logged && watcher.acted() && !(options.strict && watcher.summary().registration_contradicted()) ? 0 : 1;

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <string>
+
+#include <opencv2/core.hpp>
+
+namespace lapservo::internal {
+
+/// How a file says that its values encode light, where that is not as cameras do (sRGB, Rec. 709 and their like).
+struct Transfer {
+  enum class Kind { power, hlg, pq };
+  Kind kind = Kind::power;
+  double gamma = 1;  ///< for Kind::power: light = value^gamma
+  bool operator==(const Transfer&) const = default;
+};
+
+/// In words: "HLG".
+std::string name_of(const Transfer& transfer);
+
+/// That it is undone.
+std::string remark_on_transfer(const Transfer& transfer);
+
+/// The light of 16-bit BGR in sRGB of 8 bits. White is that of HLG's and PQ's graphics (75 % and 203 cd/m2); light
+/// beyond it is cut off.
+cv::Mat srgb_of(const cv::Mat& bgr16, const Transfer& transfer);
+
+}  // namespace lapservo::internal
