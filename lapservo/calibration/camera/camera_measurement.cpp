@@ -105,10 +105,13 @@ CameraMeasurement measure_camera(const Board& board, BoardRecordings recordings,
   if (read.stopped) return measured.calibration.refusal = "stopped", measured;
   measured.views = recordings.take_views();
   if (measured.views.empty()) {
-    measured.calibration.refusal = fmt::format(
-        "the board is in none of {} images{}: look at the board's number of inner corners, show it wholly, sharp, "
-        "with a white margin",
-        read.looked_at, read.damaged());
+    measured.calibration.refusal = read.looked_at == 0 && read.flawed > 0
+                                       ? fmt::format("all {} images are damaged: record them again", read.flawed)
+                                       : fmt::format(
+                                             "the board is in none of {} images{}: look at the board's number of inner "
+                                             "corners, show it wholly, sharp, "
+                                             "with a white margin",
+                                             read.looked_at, read.damaged());
     return measured;
   }
   int step = 0;
