@@ -41,7 +41,7 @@ using testing::from_environment;
 
 constexpr double wrong_sigmas = 4;
 
-// What a calibration says: a refusal, or errors in its own sigmas and the faults that it names.
+// An answer of a calibration: a refusal, or errors in its own sigmas and the faults that it names.
 struct Answer {
   std::string refusal;
   std::vector<double> errors;
