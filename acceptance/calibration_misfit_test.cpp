@@ -192,7 +192,8 @@ JointRecording readings_of(const Rig& truth, double seconds, std::uint64_t seed)
   return joints;
 }
 
-Swing swing(const Recording& recording) {
+// `believed_focal`: of the camera by which the poses are found, in focal lengths of the true one.
+Swing swing(const Recording& recording, double believed_focal = 1) {
   constexpr double seconds = 12.5;
   Swing result{laboratory(recording.seed)};
   const Rig& truth = result.truth;
@@ -202,6 +203,7 @@ Swing swing(const Recording& recording) {
                     with_noise(recording.noise));
   Rig free = truth;
   free.instruments[0].camera_from_rcm.reset();
+  free.camera.fx_px *= believed_focal, free.camera.fy_px *= believed_focal;
   Tracker tracker(free, {.frame_budget = std::nullopt});
   show(
       static_cast<int>(seconds * fps), fps, recording.compressed,
@@ -297,6 +299,9 @@ TEST(CalibrationMisfit, Registration) {
       departure.apply(changed);
       departed.add(departure.name, departure.cause, registration_of(changed));
     }
+    for (const double focal : {1.1, 1.05, 0.95})
+      departed.add("focal length times " + std::to_string(focal).substr(0, 4), "focal length",
+                   registration_of(swing(recording, focal)));
   }
   clean.print("registration, clean"), departed.print("registration, departed");
   EXPECT_EQ(clean.refused(), 0);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "lapservo/core/error.h"
 #include "lapservo/core/statistics.h"
 
 namespace lapservo::internal {
@@ -67,21 +68,34 @@ class Explainer {
   void try_fault(const JointFault& fault, double start_size) {
     JointRecording recording = recording_;
     const bool has_size = fault.step > 0;
-    if (!has_size || start_size != 0) fault.mend(recording, start_size);
-    const ArmStart start = start_arm(instrument_, poses_, recording, source_);
-    if (!start.refusal.empty()) return;
+    if (fault.mend && (!has_size || start_size != 0)) fault.mend(recording, start_size);
     ArmFaults free;
     if (has_size) free.joints.push_back(fault);
-    const auto fitted = fit_model(instrument_, start, recording, free, {}, at_iteration_);
+    const auto fitted = fit_to(fault.mend ? poses_ : with_focal(poses_, start_size), recording, free);
     if (!fitted) return;
     const double more = has_size ? fitted->model.blocks().joints.of(fitted->fit.x)[0] : 0;
-    Explanation explained{noise_of(fitted->fit.residuals), fault.text((1 + start_size) * (1 + more) - 1)};
-    if (!best_ || explained.left() < best_->left()) best_ = std::move(explained);
+    add(*fitted, fault.text((1 + start_size) * (1 + more) - 1));
   }
 
   const std::optional<Explanation>& best() const { return best_; }
 
  private:
+  std::optional<ModelFit> fit_to(const std::vector<TimedPose>& poses, const JointRecording& recording,
+                                 const ArmFaults& free) const {
+    try {
+      const ArmStart start = start_arm(instrument_, poses, recording, source_);
+      if (!start.refusal.empty()) return std::nullopt;
+      return fit_model(instrument_, start, recording, free, {}, at_iteration_);
+    } catch (const InputError&) {  // a mended clock may leave no time in common
+      return std::nullopt;
+    }
+  }
+
+  void add(const ModelFit& fitted, std::string text) {
+    Explanation explained{noise_of(fitted.fit.residuals), std::move(text)};
+    if (!best_ || explained.left() < best_->left()) best_ = std::move(explained);
+  }
+
   const Instrument& instrument_;
   std::vector<TimedPose> poses_;
   const JointRecording& recording_;
@@ -106,7 +120,8 @@ std::vector<JointFault> possible_faults(const Joints& joints, const std::vector<
 
 std::optional<ArmFit> fit_arm(const Instrument& instrument, const ArmStart& start, const JointRecording& recording,
                               const ArmFaults& free, const AtIteration& at_iteration) {
-  const auto faults = sized_joint_faults(instrument.joints.value(), start.poses);
+  auto faults = sized_joint_faults(instrument.joints.value(), start.poses);
+  if (free.focal) std::erase_if(faults, [](const JointFault& fault) { return !fault.mend; });
   auto fitted = fit_model(instrument, start, recording, free, faults, at_iteration);
   if (!fitted) return std::nullopt;
   ArmFit result{std::move(fitted->model), std::move(fitted->fit), {}, {}, {}};
@@ -134,14 +149,18 @@ std::optional<ArmFit> fit_arm(const Instrument& instrument, const ArmStart& star
 std::string explaining_fault(const Instrument& instrument, const std::vector<TimedPose>& poses,
                              const JointRecording& recording, const std::string& source, const ArmFit* fit,
                              const AtIteration& at_iteration) {
+  if (poses.size() < min_registration_poses) return {};
   Explainer explainer(instrument, poses, recording, source, at_iteration);
   for (const JointFault& fault : possible_faults(instrument.joints.value(), poses, fit))
     for (const double start : fault.starts) explainer.try_fault(fault, start);
-  constexpr double most_left = 3, least_gain = 1.5;  // times the noise
+  // It explains them when little is left by the images' noise or beside what there was, and much less somewhere.
+  constexpr double most_left = 3, most_part_left = 1 / 3.0, least_gain = 1.5;
   const auto& best = explainer.best();
-  if (!best || best->noise.maxCoeff() > most_left) return {};
+  if (!best) return {};
+  const double left = best->noise.maxCoeff();
   const bool gains = !fit || fit->noise.cwiseQuotient(best->noise).maxCoeff() > least_gain;
-  return gains ? best->text : std::string();
+  const bool is_little = left < most_left || (fit && left < most_part_left * fit->noise.maxCoeff());
+  return gains && is_little ? best->text : std::string();
 }
 
 }  // namespace lapservo::internal

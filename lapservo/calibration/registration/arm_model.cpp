@@ -109,7 +109,7 @@ Eigen::MatrixXd ArmModel::residuals(const Eigen::VectorXd& x) const {
 JointRecording ArmModel::mended(const Eigen::VectorXd& x) const {
   JointRecording recording = recording_;
   for (std::size_t k = 0; k < faults_.size(); ++k)
-    if (const double size = blocks_.joints.of(x)[static_cast<Eigen::Index>(k)]; size != 0)
+    if (const double size = blocks_.joints.of(x)[static_cast<Eigen::Index>(k)]; size != 0 && faults_[k].mend)
       faults_[k].mend(recording, size);
   return recording;
 }
@@ -131,16 +131,22 @@ JointRecording ArmModel::behind_backlash(const Eigen::VectorXd& x) const {
   return instrument;
 }
 
+double ArmModel::focal_change(const Eigen::VectorXd& x) const {
+  double change = blocks_.focal.size > 0 ? blocks_.focal.of(x)[0] : 0;
+  for (std::size_t k = 0; k < faults_.size(); ++k)
+    if (!faults_[k].mend) change += blocks_.joints.of(x)[static_cast<Eigen::Index>(k)];
+  return change;
+}
+
 Eigen::Matrix<double, 6, 1> ArmModel::difference(const TimedPose& pose, const Rigid3& camera_from_rcm,
                                                  const JointVector& q, const Eigen::VectorXd& x) const {
   const Rigid3 expected = camera_from_marker(marker_, camera_from_rcm * rcm_from_unrolled(q), q.psi_rad);
   const Observation::MarkerPose& seen = pose.marker;
-  const bool with_focal = blocks_.focal.size > 0;
-  const double focal = with_focal ? blocks_.focal.of(x)[0] : 0;
+  const double focal = focal_change(x);
   const Eigen::Vector3d origin = pose.origin() + focal * pose.by_focal.origin_m;
   const Eigen::Vector3d turned = focal * pose.by_focal.turn_rad;
   const Eigen::Quaterniond seen_rotation =
-      with_focal ? rotation_by(turned) * seen.camera_from_marker.rotation : seen.camera_from_marker.rotation;
+      focal != 0 ? rotation_by(turned) * seen.camera_from_marker.rotation : seen.camera_from_marker.rotation;
   const Eigen::Vector3d ray = origin.normalized(), side = ray.unitOrthogonal();
   const Eigen::Vector3d turn = seen_rotation * rotation_vector_of(expected.rotation.conjugate() * seen_rotation);
   const Eigen::Vector3d axis = seen_rotation * Eigen::Vector3d::UnitZ(), hinge = axis.cross(ray).normalized();

@@ -59,6 +59,7 @@ class ArmModel {
 
  private:
   JointRecording mended(const Eigen::VectorXd& x) const;
+  double focal_change(const Eigen::VectorXd& x) const;
   JointRecording behind_backlash(const Eigen::VectorXd& x) const;
   void add_unknowns(double delay_s, const ArmFaults& faults);
   Rigid3 camera_from_rcm_at(const Eigen::VectorXd& x, double time_s) const;

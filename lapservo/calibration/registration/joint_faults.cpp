@@ -40,10 +40,7 @@ JointFault coupling_fault(const Joints& joints, std::size_t j, std::size_t by) {
             return fmt::format(
                 "{} moves with the readings of {} too, by {:.3g} {}: these joints are coupled; record the joints' "
                 "positions, not the motors'",
-                joints.names[j], joints.names[by], size,
-                is_length(j)    ? "m/rad"
-                : is_length(by) ? "rad/m"
-                                : "rad/rad");
+                joints.names[j], joints.names[by], size, is_length(j) ? "m/rad" : "rad/rad");
           },
           [j, by](JointRecording& r, double size) {
             for (auto& at : r.joints) at[j] += size * at[by];
@@ -80,7 +77,8 @@ JointFault clock_fault(double period_s) {
                 1 + size, (1 + size) / period_s, 1 / period_s);
           },
           [](JointRecording& r, double size) {
-            for (double& time_s : r.time_s) time_s *= 1 + size;
+            const double first_s = r.time_s.front();
+            for (double& time_s : r.time_s) time_s = first_s + (1 + size) * (time_s - first_s);
           },
           1e-4, 0, clock_starts(1 / period_s)};
 }
@@ -101,6 +99,17 @@ JointFault lost_frames_fault(double from_s) {
             }
           },
           1e-3, least_lost_s};
+}
+
+JointFault focal_fault() {
+  return {[](double longer) {
+            return fmt::format("the rig's focal length is {:.3g} times the camera's: lapservo calibrate camera",
+                               1 / (1 + longer));
+          },
+          {},
+          1e-4,
+          0,
+          {-0.4, -0.2, 0, 0.25, 0.6}};
 }
 
 void unwrap(JointRecording& r) {
@@ -134,7 +143,7 @@ std::vector<JointFault> sized_joint_faults(const Joints& joints, const std::vect
     for (std::size_t by = 0; by < 4; ++by)
       if (by != j && !is_length(by)) faults.push_back(coupling_fault(joints, j, by));
   }
-  faults.push_back(clock_fault(frame_period_s(poses)));
+  faults.push_back(clock_fault(frame_period_s(poses))), faults.push_back(focal_fault());
   const double first_s = poses.front().time_s, span_s = poses.back().time_s - first_s;
   for (int part = 1; part < parts; ++part) faults.push_back(lost_frames_fault(first_s + span_s * part / parts));
   return faults;

@@ -10,18 +10,20 @@
 
 namespace lapservo::internal {
 
-/// One way in which a recording's readings are not those of the arm that the images show.
+/// One way in which a recording's readings, or its poses, are not those of the arm that the images show.
 struct JointFault {
   /// Describes readings that have it with this size, and the remedy.
   std::function<std::string(double size)> text;
-  /// Mends readings that have it with this size.
+  /// Mends readings that have it with this size. Empty for the focal length by which the poses were found: TimedPose
+  /// says what that does to them.
   std::function<void(JointRecording&, double size)> mend;
   double step = 0;                   ///< for derivatives by the size; 0: it is there or not, and has no size
   double least = 0;                  ///< smaller ones are not worth a word
   std::vector<double> starts = {0};  ///< from where a fit of its size may have to begin
 };
 
-/// Scales, couplings and times of the joints, the clock, frames that are lost: faults with a size, of which 0 is none.
+/// Scales, couplings and times of the joints, the clock, frames that are lost, the focal length: faults with a size, of
+/// which 0 is none.
 std::vector<JointFault> sized_joint_faults(const Joints& joints, const std::vector<TimedPose>& poses);
 
 /// Columns that are exchanged, angles that wrap, readings that are held.

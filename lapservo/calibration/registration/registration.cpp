@@ -197,9 +197,10 @@ Registration register_rcm(const Instrument& instrument, const std::vector<TimedP
   return result;
 }
 
-Registration register_arm(const Instrument& instrument, const std::vector<TimedPose>& poses,
+Registration register_arm(const Instrument& instrument, const std::vector<TimedPose>& seen,
                           const JointRecording& recording, const std::string& source, const AtIteration& at_iteration) {
   Registration result;
+  const std::vector<TimedPose> poses = with_focal(seen, 0);
   const auto explained = [&](const ArmFit* fit) {
     return explaining_fault(instrument, poses, recording, source, fit, at_iteration);
   };

@@ -279,7 +279,9 @@ TEST(RegisterArm, RefusesWhatCanNotTell) {
   EXPECT_NE(registered_from_names(swapped).refusal, "");
   for (double& time_s : elsewhere.recording.time_s) time_s += 100;
   EXPECT_TRUE(has(input_error([&] { registered_from_names(elsewhere); }), "has no time in common"));
-  few.poses.resize(10);
+  few.poses.clear();
+  EXPECT_TRUE(has(registered_from_names(few).refusal, "found in 0 frames"));
+  few.poses.assign(data.poses.begin(), data.poses.begin() + 10);
   EXPECT_TRUE(has(registered_from_names(few).refusal, "found in 10 frames"));
 }
 

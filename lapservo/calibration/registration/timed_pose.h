@@ -28,6 +28,10 @@ struct TimedPose {
   double miss_m(const Eigen::Vector3d& point_m) const { return (origin() - point_m).cross(axis()).norm(); }
 };
 
+/// The poses as a focal length that is longer by this part has them, with their ByFocal: depths grow by it, the image
+/// stays.
+std::vector<TimedPose> with_focal(std::vector<TimedPose> poses, double longer);
+
 /// How many of them there are in a second: over about as many, what is wrong with them stays alike.
 inline std::size_t poses_per_second(const std::vector<TimedPose>& poses) {
   const double span_s = poses.empty() ? 0 : poses.back().time_s - poses.front().time_s;
