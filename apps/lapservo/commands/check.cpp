@@ -16,6 +16,7 @@
 #include "apps/lapservo/commands/check_report.h"
 #include "apps/lapservo/inputs/frame_input.h"
 #include "apps/lapservo/inputs/joint_input.h"
+#include "lapservo/calibration/check/frame_diagnosis.h"
 #include "lapservo/calibration/check/rig_check.h"
 #include "lapservo/calibration/check/work_space.h"
 #include "lapservo/calibration/colour/colour_calibration.h"
@@ -51,11 +52,13 @@ int check(const CalibrateOptions& options) {
 
   constexpr int enough = 1800;
   RigEvidence evidence(rig, index);
+  FrameDiagnosis diagnosis(rig, options.deinterlace);
   cv::Mat seen, missed;  // the last frames with and without the marker
   int count = 0;         // of those with it
   const FramesRead read = read_frames({*source, options.input, options.deinterlace}, rig, every_of(*source, enough),
                                       watched_job(), [&](const cv::Mat& bgr, double time_s) {
                                         const bool found = evidence.add(bgr, time_s);
+                                        if (!found && count == 0) diagnosis.add(bgr, {});
                                         (found ? seen : missed) = bgr, count += found;
                                         return fmt::format(", {} in {}", instrument.name, count);
                                       });
@@ -70,6 +73,7 @@ int check(const CalibrateOptions& options) {
     progress.show(1, " of 3: the arm");
     checked.findings = findings_of(rig, index, evidence);
     checked.frames = evidence.frames();
+    if (count == 0) checked.findings.cause = diagnosis.cause();
     // Takes as long as the rest, which needs nothing of it.
     std::future<PrintCheck> print;
     if (checked.findings.light)

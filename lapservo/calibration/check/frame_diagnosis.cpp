@@ -103,8 +103,10 @@ void FrameDiagnosis::add(const cv::Mat& bgr, const std::vector<Observation>& obs
     ++seen.ok;
     seen.with_q += observation.rcm ? 1 : 0;
     const auto& camera_from_rcm = rig_.instruments[i].camera_from_rcm;
-    if (camera_from_rcm && !observation.rcm && observation.marker)
-      seen.misses_m.push_back(TimedPose{0, *observation.marker}.miss_m(camera_from_rcm->translation));
+    if (!camera_from_rcm || observation.rcm || !observation.marker) continue;
+    const TimedPose pose{0, *observation.marker};
+    seen.misses_m.push_back(pose.miss_m(camera_from_rcm->translation));
+    seen.reversed += pose.beyond_m(camera_from_rcm->translation) < 0 ? 1 : 0;
   }
   interlaced_ += interlaced ? 1 : 0;
   if (!any_ok) keep(bgr);
@@ -154,6 +156,8 @@ std::string FrameDiagnosis::cause_in_frames() const {
 std::string FrameDiagnosis::text_of_missed_rcm() const {
   for (const auto& [name, seen] : seen_) {
     if (static_cast<int>(seen.misses_m.size()) < least_missed || 2 * seen.with_q >= seen.ok) continue;
+    if (2 * static_cast<std::size_t>(seen.reversed) > seen.misses_m.size())
+      return fmt::format("{}: in {} of {} frames {}", name, seen.reversed, seen.ok, reversed_marker);
     return fmt::format(
         "{}: in {} of {} frames the shaft misses the rig's RCM, by {:.1f} mm (median): lapservo calibrate registration "
         "measures camera_from_rcm{}",

@@ -34,6 +34,7 @@ class FrameDiagnosis {
   struct Seen {
     int ok = 0, with_q = 0;
     std::vector<double> misses_m;  ///< distances of the shaft's axis from the rig's RCM, where q is missing
+    int reversed = 0;              ///< of them, those whose marker points back to the RCM
   };
   void keep(const cv::Mat& bgr);
   std::string cause_in_frames() const;

@@ -102,9 +102,11 @@ class Advisor {
     if (f_.light && f_.hue_error_deg > rig_limits.hue_deg)
       add(true, fmt::format("the bands' hues are {:.0f} degrees from the rig's", f_.hue_error_deg),
           "lapservo calibrate colour", "the marker is found where its colours are near the limit now");
-    if (!f_.light && !clipped() && !dark())
-      add(true, found_text() + ": its colours are not the image's", "lapservo calibrate colour",
-          "finding it at all; look at diameter_m too, and whether the marker is in view");
+    if (f_.light || clipped() || dark()) return;
+    const bool known = !f_.cause.empty();
+    add(true, found_text() + (known ? f_.cause : ": its colours are not the image's"),
+        known ? "mend that, and record again" : "lapservo calibrate colour",
+        known ? "finding it at all" : "finding it at all; look at diameter_m too, and whether the marker is in view");
   }
 
   void response() {
@@ -212,8 +214,8 @@ class Advisor {
     }
     if (!f_.rcm) return;
     if (!f_.rcm->refusal.empty())
-      add(false, "whether the RCM is right is unknown: " + f_.rcm->refusal, "record a swing, then lapservo check",
-          "an RCM that is off bends every pose");
+      add(f_.rcm->refusal == reversed_marker, "whether the RCM is right is unknown: " + f_.rcm->refusal,
+          "record a swing, then lapservo check", "an RCM that is off bends every pose");
     else if (f_.rcm->distance_m && f_.rcm->distance_m->exceeds(2 * rig_limits.place_m))
       add(true,
           fmt::format("the axes meet {:.1f} mm from the rig's RCM (sigma {:.1f} mm)", 1e3 * f_.rcm->distance_m->value,

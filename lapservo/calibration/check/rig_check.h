@@ -42,6 +42,7 @@ struct WorkSpace {
 struct RigFindings {
   std::size_t frames = 0;
   int found = 0, mismatched = 0;  ///< frames
+  std::string cause;              ///< of frames in which it is not found: FrameDiagnosis::cause()
   std::string failure;            ///< the status that is most frequent of those that are not ok; empty when all are
   PictureLight picture;
   std::optional<MarkerLight> light;  ///< medians; empty when no frame shows the marker

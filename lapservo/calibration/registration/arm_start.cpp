@@ -7,6 +7,7 @@
 #include "lapservo/calibration/registration/axes_meeting_point.h"
 #include "lapservo/calibration/registration/delay_search.h"
 #include "lapservo/core/error.h"
+#include "lapservo/core/statistics.h"
 
 namespace lapservo::internal {
 namespace {
@@ -55,7 +56,9 @@ ArmStart start_arm(const Instrument& instrument, const std::vector<TimedPose>& p
     return start.refusal = std::string("the shaft's axes are too alike to locate their intersection: ") + swing_more,
            start;
   std::vector<double> rho_m;
-  for (const TimedPose& pose : poses) rho_m.push_back((pose.origin() - meeting->point_m).dot(pose.axis()));
+  for (const TimedPose& pose : poses) rho_m.push_back(pose.beyond_m(meeting->point_m));
+
+  if (median(std::vector(rho_m)) < 0) return start.refusal = reversed_marker, start;
 
   constexpr double least_explained = 0.5, max_misfit_rad = 0.1;
   const auto foreign = [&](const std::string& how) {

@@ -182,6 +182,9 @@ Registration register_rcm(const Instrument& instrument, const std::vector<TimedP
   if (!meeting || sigma_m.norm() > max_sigma_m)
     return result.refusal = std::string("the shaft's axes are too alike to locate their intersection: ") + swing_more,
            result;
+  std::vector<double> beyond_m;
+  for (const TimedPose& pose : poses) beyond_m.push_back(pose.beyond_m(meeting->point_m));
+  if (median(beyond_m) < 0) return result.refusal = reversed_marker, result;
   const bool known = instrument.camera_from_rcm.has_value();
   result.camera_from_rcm = {known ? instrument.camera_from_rcm->rotation : usual_rotation(poses), meeting->point_m};
   result.sigma_translation_m = sigma_m;

@@ -228,6 +228,16 @@ TEST(RegisterArm, PlacesMarkersAsTheirSigmasSayBesideTheSwing) {
   }
 }
 
+TEST(RegisterArm, NamesAMarkerThatIsMountedTheWrongWayRound) {
+  Recorded data = recorded({});
+  for (TimedPose& pose : data.poses) {
+    Rigid3& camera_from_marker = pose.marker.camera_from_marker;
+    camera_from_marker.rotation = camera_from_marker.rotation * Eigen::AngleAxisd(pi, Eigen::Vector3d::UnitX());
+  }
+  EXPECT_TRUE(has(registered_from_names(data).refusal, "the marker points away from the tip"));
+  EXPECT_TRUE(has(register_rcm(data.truth, data.poses).refusal, "the marker points away from the tip"));
+}
+
 // Whatever signs the rig has, and without offsets.
 TEST(RegisterArm, RefusesWhereJointsStoodStillAndNamesThem) {
   for (unsigned still = 1; still < 15; ++still) {

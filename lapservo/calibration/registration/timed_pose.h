@@ -24,9 +24,15 @@ struct TimedPose {
 
   Eigen::Vector3d origin() const { return marker.camera_from_marker.translation; }  ///< in the camera frame
   Eigen::Vector3d axis() const { return marker.camera_from_marker.rotation * Eigen::Vector3d::UnitZ(); }
-  /// How far the axis passes a point in the camera frame.
+  /// How far the axis passes a point in the camera frame, and how far along the axis the origin lies from there.
   double miss_m(const Eigen::Vector3d& point_m) const { return (origin() - point_m).cross(axis()).norm(); }
+  double beyond_m(const Eigen::Vector3d& point_m) const { return (origin() - point_m).dot(axis()); }
 };
+
+/// Describes a marker whose axis points back to the RCM, and the remedy.
+inline constexpr auto reversed_marker =
+    "the marker points away from the tip: it is mounted the wrong way round; its proximal end (band 0) belongs to the "
+    "trocar";
 
 /// The poses as a focal length that is longer by this part has them, with their ByFocal: depths grow by it, the image
 /// stays.
