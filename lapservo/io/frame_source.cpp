@@ -111,6 +111,7 @@ class VideoSource : public FrameSource {
   double frames_per_second() const override { return video_.frames_per_second(); }
   std::string remark() const override { return video_.remark(); }
   bool is_srgb() const override { return video_.is_srgb(); }
+  bool is_lossy() const override { return video_.is_lossy(); }
   std::string complaint() const override { return video_.complaint(); }
 
  private:
@@ -141,6 +142,7 @@ class StreamSource : public FrameSource {
   double frames_per_second() const override { return stream_.frames_per_second(); }
   std::string remark() const override { return stream_.remark(); }
   bool is_srgb() const override { return stream_.is_srgb(); }
+  bool is_lossy() const override { return stream_.is_lossy(); }
 
  private:
   VideoReader stream_;

@@ -38,6 +38,8 @@ class FrameSource {
   virtual std::string remark() const { return {}; }
   /// Whether its values are light in sRGB by what the file names (HLG, PQ, linear), whatever the camera's response.
   virtual bool is_srgb() const { return false; }
+  /// Whether its frames went through a codec that loses some of them, as videos' do: edges of colours lie aside then.
+  virtual bool is_lossy() const { return false; }
   /// After the end: what is wrong with the file as a whole, for example that it ends early; empty when nothing is.
   virtual std::string complaint() const { return {}; }
 };

@@ -73,6 +73,7 @@ int check(const CalibrateOptions& options) {
     progress.show(1, " of 3: the arm");
     checked.findings = findings_of(rig, index, evidence);
     checked.frames = evidence.frames();
+    checked.findings.lossy = read.lossy;
     if (count == 0) checked.findings.cause = diagnosis.cause();
     // Takes as long as the rest, which needs nothing of it.
     std::future<PrintCheck> print;

@@ -111,6 +111,15 @@ class Advisor {
 
   void response() {
     if (!f_.response || !f_.response->better || f_.response->before_px < rig_limits.response_px) return;
+    if (f_.lossy) {
+      add(false,
+          fmt::format(
+              "the recording is compressed: edges of channels that rise and fall at one place lie {:.2f} px apart",
+              f_.response->before_px),
+          "record without losses or at a higher bit rate",
+          "sigma of psi, and whether the rig's response is the camera's");
+      return;
+    }
     add(true,
         fmt::format("the camera encodes light otherwise than the rig says{}, rather as {}: edges of channels that rise "
                     "and fall at one place lie {:.2f} px apart",

@@ -49,6 +49,7 @@ struct RigFindings {
   double hue_error_deg = 0;          ///< the largest of the three bands'
   double width_px = 0;               ///< median
   std::optional<MarkerResponse::Result> response;
+  bool lossy = false;              ///< the recording: compression moves the edges of channels, too
   bool response_measured = false;  ///< by `calibrate camera`: `calibrate colour` alone would keep it
   std::optional<PrintCheck> print;
   std::optional<ArmCheck> arm;  ///< with joints

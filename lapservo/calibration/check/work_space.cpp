@@ -45,16 +45,6 @@ class Judge {
   std::uint64_t seed_ = 0;
 };
 
-double real_over_rendered(Judge& judge, const std::vector<MeasuredSigma>& measured) {
-  constexpr std::size_t enough = 12;
-  std::vector<double> ratios;
-  const std::size_t step = std::max<std::size_t>(1, measured.size() / enough);
-  for (std::size_t i = 0; i < measured.size(); i += step)
-    if (const auto rendered = judge.sigma_rad(measured[i].camera_from_unrolled, measured[i].psi_rad))
-      ratios.push_back(measured[i].sigma_rad / *rendered);
-  return ratios.empty() ? 1 : median(ratios);
-}
-
 // A shaft whose marker's proximal end lies there.
 std::optional<Rigid3> shaft_at(const Judge& judge, const Eigen::Vector3d& place, const MeasuredSigma& like) {
   const auto& camera_from_rcm = judge.instrument().camera_from_rcm;
@@ -62,6 +52,22 @@ std::optional<Rigid3> shaft_at(const Judge& judge, const Eigen::Vector3d& place,
   const auto q = configuration_through(*camera_from_rcm, place);
   if (!q) return std::nullopt;
   return *camera_from_rcm * rcm_from_unrolled(*q);
+}
+
+double real_over_rendered(Judge& judge, const std::vector<MeasuredSigma>& measured) {
+  constexpr std::size_t enough = 12;
+  std::vector<double> ratios;
+  const std::size_t step = std::max<std::size_t>(1, measured.size() / enough);
+  for (std::size_t i = 0; i < measured.size(); i += step) {
+    // Through the RCM, as the rig has it: a pose by the image alone misses it, and would be fitted otherwise.
+    const Rigid3& marker = measured[i].camera_from_unrolled;
+    const auto shaft = shaft_at(judge, marker.translation, measured[i]);
+    if (!shaft) continue;
+    const Eigen::Vector3d x = shaft->rotation.conjugate() * (marker.rotation * Eigen::Vector3d::UnitX());
+    if (const auto rendered = judge.sigma_rad(*shaft, measured[i].psi_rad + std::atan2(x.y(), x.x())))
+      ratios.push_back(measured[i].sigma_rad / *rendered);
+  }
+  return ratios.empty() ? 1 : median(ratios);
 }
 
 // A shaft whose marker's middle lies there, where the marker is wholly in view.

@@ -53,6 +53,7 @@ FramesRead read_frames(const FrameRecording& recording, const Rig& rig, int ever
                look(deinterlace ? field.of(frame->bgr).clone() : frame->bgr, frame->time_s));
   }
   if (flawed.all() > 0 && frames.looked_at == 0) throw InputError(recording.name, flawed.text(flawed.all()));
+  frames.lossy = source.is_lossy() || frames.jpegs > 0;
   frames.complaint = source.complaint();
   return frames;
 }

@@ -45,6 +45,7 @@ struct FramesRead {
   int looked_at = 0, flawed = 0;
   int jpegs = 0;          ///< of those looked at: what compressed them saw no frame before
   bool stopped = false;   ///< by the user
+  bool lossy = false;     ///< FrameSource::is_lossy(), or JPEG
   std::string complaint;  ///< what could not be read; empty when all was
 
   /// " (3 are damaged)", or nothing.

@@ -20,7 +20,8 @@ class ReadAhead : public FrameSource {
         frames_per_second_(source_->frames_per_second()),
         first_stamp_s_(source_->first_stamp_s()),
         remark_(source_->remark()),
-        is_srgb_(source_->is_srgb()) {}
+        is_srgb_(source_->is_srgb()),
+        is_lossy_(source_->is_lossy()) {}
   ~ReadAhead() override { stop(); }
 
   std::optional<Frame> next() override {
@@ -35,6 +36,7 @@ class ReadAhead : public FrameSource {
   std::optional<double> first_stamp_s() const override { return first_stamp_s_; }
   std::string remark() const override { return remark_; }
   bool is_srgb() const override { return is_srgb_; }
+  bool is_lossy() const override { return is_lossy_; }
   /// The end of the source: no frame follows it.
   std::string complaint() const override {
     stop();
@@ -63,7 +65,7 @@ class ReadAhead : public FrameSource {
   double frames_per_second_;
   std::optional<double> first_stamp_s_;
   std::string remark_;
-  bool is_srgb_;
+  bool is_srgb_, is_lossy_;
   mutable BoundedQueue<Frame> frames_{most_ahead};
   std::exception_ptr failure_;  // the thread's, until frames_ is closed
   mutable bool stopped_ = false;

@@ -110,6 +110,10 @@ class VideoReader::State {
 
   const std::string& remark() const { return remark_; }
   bool is_srgb() const { return is_srgb_; }
+  bool is_lossy() const {
+    const AVCodecDescriptor* codec = avcodec_descriptor_get(stream_->codecpar->codec_id);
+    return codec && (codec->props & AV_CODEC_PROP_LOSSY) != 0;
+  }
 
   std::string complaint() const {
     constexpr double slack = 0.01;  // durations are rounded
@@ -338,6 +342,9 @@ double VideoReader::frames_per_second() const {
 }
 std::string VideoReader::remark() const {
   return state_->remark();
+}
+bool VideoReader::is_lossy() const {
+  return state_->is_lossy();
 }
 bool VideoReader::is_srgb() const {
   return state_->is_srgb();

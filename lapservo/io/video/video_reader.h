@@ -40,6 +40,7 @@ class VideoReader {
   std::string remark() const;
   /// After the first frame: FrameSource::is_srgb().
   bool is_srgb() const;
+  bool is_lossy() const;  ///< FrameSource::is_lossy()
   /// After the end: that the frames end before the duration that the container announces or within a frame, else empty.
   std::string complaint() const;
 

@@ -1,3 +1,4 @@
+#include "lapservo/io/frame_source.h"
 #include "lapservo/io/video/video_writer.h"
 
 #include <csignal>
@@ -58,6 +59,13 @@ TEST(VideoWriter, SaysThatChromasSamplesLieAmidFourPixels) {
     ASSERT_GE(avformat_find_stream_info(file.get(), nullptr), 0);
     EXPECT_EQ(file->streams[0]->codecpar->chroma_location, AVCHROMA_LOC_CENTER) << extension;
   }
+}
+
+TEST(VideoWriter, WritesWithLosses) {
+  const TemporaryFolder folder;
+  VideoWriter video(folder / "a.mp4", 30);
+  write_noise(video, 3);
+  EXPECT_TRUE(open_frame_source((folder / "a.mp4").string(), 25)->is_lossy());
 }
 
 TEST(VideoWriter, RefusesWhatCanNotHoldOne) {
