@@ -140,7 +140,7 @@ std::optional<ArmFit> fit_arm(const Instrument& instrument, const ArmStart& star
   result.covariance = (arm_covariance(fit) + with_seen.by_seen).topLeftCorner(numbers, numbers) +
                       bias * bias.transpose() + without.by_instead;
   for (std::size_t k = free.joints.size(); k < with.joints.size(); ++k) {
-    const double size = model.blocks().joints.of(fit.x)[static_cast<Eigen::Index>(k)];
+    const double size = fit.x[model.blocks().joints.first + static_cast<Eigen::Index>(k)];
     if (std::abs(size) > with.joints[k].least) result.faults.push_back(with.joints[k].text(size));
   }
   return result;

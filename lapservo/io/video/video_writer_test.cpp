@@ -1,4 +1,3 @@
-#include "lapservo/io/frame_source.h"
 #include "lapservo/io/video/video_writer.h"
 
 #include <csignal>
@@ -10,6 +9,7 @@
 
 #include <gtest/gtest.h>
 
+#include "lapservo/io/frame_source.h"
 #include "lapservo/io/video/libav.h"
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
