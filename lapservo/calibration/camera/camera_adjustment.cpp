@@ -172,9 +172,8 @@ Departures departures_at(ceres::Problem& problem, const FittedNumbers& fitted, c
   Eigen::Index row = 0;
   for (std::size_t i = 0; i < costs.size(); ++i)
     for (const EdgeCost& cost : costs[i]) {
-      const double residual = cost.residual(c, views[i]) / loss_scale_sigmas;
       const Eigen::RowVectorXd by =
-          slopes_of(cost, c, views[i], board_m, height_px) / std::sqrt(1 + residual * residual);
+          trust(cost.residual(c, views[i]), loss_scale_sigmas) * slopes_of(cost, c, views[i], board_m, height_px);
       slopes.row(row).head<board_faults>() = by.head(board_faults);
       slopes.row(row++).segment<view_faults>(board_faults + view_faults * static_cast<Eigen::Index>(i)) =
           by.tail(view_faults);

@@ -190,8 +190,7 @@ std::string text_of(CameraFault::Kind kind, double size, const std::string& wher
     case CameraFault::Kind::zoom:
       return fmt::format(
           "the focal length of {} is {:+.2g} % off the others': images of another camera, zoom or focus; calibrate "
-          "each "
-          "of them by itself",
+          "each of them by itself",
           where, 100 * size);
     case CameraFault::Kind::centre:
       return fmt::format(

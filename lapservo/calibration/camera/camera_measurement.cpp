@@ -78,7 +78,7 @@ void BoardRecordings::look_at(FrameSource& source, const std::string& name, cons
     check_frame_size(*frame, name, *size_, whose_);
     if (read++ % every != 0) continue;
     if (frame->flaw) {
-      ++read_.flawed;
+      read_.flawed.add(*frame->flaw);
       continue;
     }
     ++read_.looked_at;
@@ -105,13 +105,13 @@ CameraMeasurement measure_camera(const Board& board, BoardRecordings recordings,
   if (read.stopped) return measured.calibration.refusal = "stopped", measured;
   measured.views = recordings.take_views();
   if (measured.views.empty()) {
-    measured.calibration.refusal = read.looked_at == 0 && read.flawed > 0
-                                       ? fmt::format("all {} images are damaged: record them again", read.flawed)
-                                       : fmt::format(
-                                             "the board is in none of {} images{}: look at the board's number of inner "
-                                             "corners, show it wholly, sharp, "
-                                             "with a white margin",
-                                             read.looked_at, read.damaged());
+    measured.calibration.refusal =
+        read.all_flawed()
+            ? read.flawed.text(read.flawed.all())
+            : fmt::format(
+                  "the board is in none of {} images{}: look at the board's number of inner corners, show it wholly, "
+                  "sharp, with a white margin",
+                  read.looked_at, read.damaged());
     return measured;
   }
   int step = 0;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <vector>
 
@@ -7,6 +8,11 @@
 #include <Eigen/SparseCore>
 
 namespace lapservo::internal {
+
+/// Weight of a residual, as large as this, under Cauchy's loss of this scale; its square is the loss's derivative.
+inline double trust(double residual, double loss_scale) {
+  return 1 / std::hypot(1.0, residual / loss_scale);
+}
 
 /// A fit of numbers x by least squares at its solution; residuals and slopes in units of the noise.
 struct LinearFit {

@@ -191,7 +191,7 @@ Departures departures_at(const Linearisation& at, const Eigen::VectorXd& x, cons
   Eigen::MatrixXd jacobian(rows + numbers, numbers), weighed(channels, frames);
   for (Eigen::Index i = 0; i < frames; ++i) {
     const Eigen::VectorXd residual = weights.cwiseProduct(at.residuals.col(i));
-    weighed.col(i) = weights / std::sqrt(1 + residual.squaredNorm() / (scale * scale));
+    weighed.col(i) = trust(residual.norm(), scale) * weights;
     fit.groups.push_back(channels * i);
     fit.residuals.segment(channels * i, channels) = weighed.col(i).cwiseProduct(at.residuals.col(i));
     jacobian.middleRows(channels * i, channels) = weighed.col(i).asDiagonal() * at.jacobian(i);

@@ -307,9 +307,8 @@ PrintDepartures departures_at(ceres::Problem& problem, const std::vector<ViewMea
   for (std::size_t i = 0; i < frames.size(); ++i)
     for (std::size_t k = 0; k < edges[i].size(); ++k) {
       if (edges[i][k].group >= boundaries) continue;
-      const double in_scales = edges[i][k].cost->left() / loss_scale_sigmas;
-      slopes.row(edges[i][k].row) =
-          slopes_of(frames[i].edges.all[k], frames[i].time_s, possible) / std::sqrt(1 + in_scales * in_scales);
+      slopes.row(edges[i][k].row) = trust(edges[i][k].cost->left(), loss_scale_sigmas) *
+                                    slopes_of(frames[i].edges.all[k], frames[i].time_s, possible);
     }
   const Departures departures = departures_of(fit, slopes);
   PrintDepartures result;

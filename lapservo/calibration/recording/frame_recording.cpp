@@ -18,7 +18,7 @@ std::string FlawedFrames::text(int frames) const {
 }
 
 std::string FramesRead::damaged() const {
-  return flawed ? fmt::format(" ({} are damaged)", flawed) : "";
+  return flawed.all() > 0 ? fmt::format(" ({} are damaged)", flawed.all()) : "";
 }
 
 void check_frame_size(const Frame& frame, const std::string& recording, const cv::Size& expected,
@@ -35,7 +35,6 @@ FramesRead read_frames(const FrameRecording& recording, const Rig& rig, int ever
   const bool deinterlace = recording.deinterlace || rig.camera.deinterlace;
   EvenField field(rig.camera.response);
   FramesRead frames;
-  FlawedFrames flawed;
   int read = 0;
   while (!(frames.stopped = watch.stopped())) {
     const auto frame = source.next();
@@ -43,8 +42,7 @@ FramesRead read_frames(const FrameRecording& recording, const Rig& rig, int ever
     check_frame_size(*frame, recording.name, {rig.camera.width_px, rig.camera.height_px}, "the rig's camera");
     if (read++ % every != 0) continue;
     if (frame->flaw) {
-      ++frames.flawed;
-      flawed.add(*frame->flaw);
+      frames.flawed.add(*frame->flaw);
       continue;
     }
     ++frames.looked_at;
@@ -52,7 +50,7 @@ FramesRead read_frames(const FrameRecording& recording, const Rig& rig, int ever
     watch.tell(source.frame_count(), read,
                look(deinterlace ? field.of(frame->bgr).clone() : frame->bgr, frame->time_s));
   }
-  if (flawed.all() > 0 && frames.looked_at == 0) throw InputError(recording.name, flawed.text(flawed.all()));
+  if (frames.all_flawed()) throw InputError(recording.name, frames.flawed.text(frames.flawed.all()));
   frames.lossy = source.is_lossy() || frames.jpegs > 0;
   frames.complaint = source.complaint();
   return frames;

@@ -42,12 +42,14 @@ struct FlawedFrames {
 
 /// Counts of a recording's frames.
 struct FramesRead {
-  int looked_at = 0, flawed = 0;
+  int looked_at = 0;
+  FlawedFrames flawed;
   int jpegs = 0;          ///< of those looked at: what compressed them saw no frame before
   bool stopped = false;   ///< by the user
   bool lossy = false;     ///< FrameSource::is_lossy(), or JPEG
   std::string complaint;  ///< what could not be read; empty when all was
 
+  bool all_flawed() const { return flawed.all() > 0 && looked_at == 0; }
   /// " (3 are damaged)", or nothing.
   std::string damaged() const;
 };

@@ -76,8 +76,7 @@ void print_result(const std::vector<BoardView>& views, const CameraCalibration& 
                 calibration.view_rms_px[i]);
   for (const CalibratedNumber& n : calibrated_numbers(Camera{}, calibration))
     std::printf("  %-24s %12.6f   sigma %.6f\n", n.name.c_str(), n.after, n.sigma);
-  for (const std::string& fault : calibration.faults)
-    std::printf("beyond the noise, counted in the sigmas: %s\n", fault.c_str());
+  print_faults(calibration.faults);
   if (!calibration.response) {
     std::printf("response: unchanged, these images don't determine it\n");
     return;

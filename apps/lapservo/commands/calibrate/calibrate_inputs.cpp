@@ -62,6 +62,10 @@ void say_complaint(const std::string& input, const std::string& complaint) {
     std::fprintf(stderr, "lapservo: %s: %s: what could be read is used\n", input.c_str(), complaint.c_str());
 }
 
+void print_faults(const std::vector<std::string>& faults) {
+  for (const std::string& fault : faults) std::printf("beyond the noise, counted in the sigmas: %s\n", fault.c_str());
+}
+
 JobWatch watched_job() {
   struct Stage {
     std::optional<Progress> progress;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "apps/lapservo/cli/subcommands.h"
 #include "apps/lapservo/inputs/frame_input.h"
@@ -32,6 +33,9 @@ void refuse_outputs_over_inputs(const CalibrateOptions& options, const Rig& rig)
 
 /// Prints on stderr the parts that a source could not read.
 void say_complaint(const std::string& input, const std::string& complaint);
+
+/// Prints the faults of a recording that a calibration sees beyond the noise.
+void print_faults(const std::vector<std::string>& faults);
 
 /// Ends a job at Ctrl-C and shows its progress (progress.h), until it is destroyed.
 internal::JobWatch watched_job();

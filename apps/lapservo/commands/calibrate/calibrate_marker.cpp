@@ -58,8 +58,7 @@ int calibrate_marker(const CalibrateOptions& options) {
   print_table(calibrated_numbers(instrument.marker, calibration.marker, joints.has_value()));
   std::printf("\nboundaries miss the print by %.3f px rms before, %.3f px after\n", calibration.before_px,
               calibration.after_px);
-  for (const std::string& fault : calibration.faults)
-    std::printf("beyond the noise, counted in the sigmas: %s\n", fault.c_str());
+  print_faults(calibration.faults);
   std::printf(
       "diameter_m is the rig's (%.3f mm): images give lengths in diameters; a smaller shaft nearer by looks the same\n",
       1e3 * instrument.marker.diameter_m);

@@ -94,8 +94,7 @@ int calibrate_registration(const CalibrateOptions& options) {
   print_numbers(instrument, registration);
   print_residuals(registration);
   print_reach(instrument.marker, registration);
-  for (const std::string& fault : registration.faults)
-    std::printf("beyond the noise, counted in the sigmas: %s\n", fault.c_str());
+  print_faults(registration.faults);
   for (const std::string& what : registration.unknown) std::printf("%s\n", what.c_str());
   rig.instruments[index] = registered(rig.instruments[index], registration);
   out.stream() << rig_yaml(rig, options.out);
