@@ -46,7 +46,7 @@ void print_errors(const std::string& name, const std::vector<TrueFrame>& frames)
   std::vector<double> radii_px;
   for (const TrueFrame& frame : frames) {
     const scenes::Sight sight(frame.rig, frame.bgr);
-    const PoseUnknowns truth = PoseUnknowns::rcm(*frame.rig.instruments[0].camera_from_rcm, frame.truths[0].q);
+    const PoseUnknowns truth(pose_through_rcm(*frame.rig.instruments[0].camera_from_rcm, frame.truths[0].q), true);
     const FineFit fit = fit_finely(sight.scene(), sight.light(), truth, {});
     if (!fit.converged) continue;
     const EdgeMeasurements edges = measure_edges(sight.scene(), sight.light(), truth, film_mean_m, effort, fit.blur);

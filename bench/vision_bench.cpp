@@ -68,10 +68,12 @@ void fit(benchmark::State& state) {
   const auto table = rig.camera.response.table();
   const LightImage light(image, table, ChannelGeometry(rig.camera));
   const ColourClasses classes(rig.instruments);
-  const Scene scene{image, rig.camera, classes, instrument.marker, classes.of_bands(0)};
+  Scene scene{image, rig.camera, classes, instrument.marker, classes.of_bands(0)};
+  const auto registration = registration_of(instrument);
+  scene.registration = &*registration;
   JointVector q = configurations(rig, 0)[0];
   q.theta_rad += 1e-3, q.phi_rad -= 1e-3, q.rho_m += 2e-4, q.psi_rad += 0.01;
-  const PoseUnknowns start = PoseUnknowns::rcm(*instrument.camera_from_rcm, q);
+  const PoseUnknowns start(pose_through_rcm(*instrument.camera_from_rcm, q), true);
   bool converged = true;
   for (auto _ : state) converged &= fit_finely(scene, light, start, {}).converged;
   state.counters["found"] = converged;

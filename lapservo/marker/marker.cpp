@@ -26,12 +26,20 @@ FieldProblem problem(const std::string& field, double value, const std::string& 
 
 }  // namespace
 
+std::optional<double> Marker::measured_sigma_m() const {
+  if (!sigmas.bands_upper_m || !sigmas.bands_lower_m) return std::nullopt;
+  if (tolerance_m > 0) return tolerance_m;
+  // Between what bands leave that were measured each by itself (0.9), and boundaries that were (0.7).
+  constexpr double boundary_by_band = 0.8;
+  double squares = 0;
+  for (const auto& bands_m : {*sigmas.bands_upper_m, *sigmas.bands_lower_m})
+    for (const double sigma_m : bands_m) squares += sigma_m * sigma_m / 6;
+  return boundary_by_band * std::sqrt(squares);
+}
+
 bool Marker::bands_are_measured() const {
   constexpr double largest_sigma_m = 0.03e-3;
-  const auto known = [](const std::optional<std::array<double, 3>>& sigmas_m) {
-    return sigmas_m && *std::max_element(sigmas_m->begin(), sigmas_m->end()) <= largest_sigma_m;
-  };
-  return known(sigmas.bands_upper_m) && known(sigmas.bands_lower_m);
+  return measured_sigma_m().value_or(1) <= largest_sigma_m;
 }
 
 std::array<double, 4> boundaries_m(const Marker& marker, double tau_rad) {

@@ -36,7 +36,12 @@ struct Marker {
   bool operator==(const Marker&) const = default;
   double radius_m() const { return diameter_m / 2; }
   double covered_rad() const { return 2 * std::numbers::pi - gap_rad; }
-  /// Whether all bands were measured to within 0.03 mm (one sigma), which is about 15 mrad of psi.
+  /// Standard deviation of where each boundary lies at either edge of a print whose bands all were measured; nullopt of
+  /// others.
+  std::optional<double> measured_sigma_m() const;
+  /// The same, as far as the rig says.
+  double boundary_sigma_m() const { return measured_sigma_m().value_or(tolerance_m); }
+  /// Whether it was measured to within 0.03 mm, which is about 15 mrad of psi.
   bool bands_are_measured() const;
   double length_m() const { return bands_upper_m[0] + bands_upper_m[1] + bands_upper_m[2]; }
 };

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "lapservo/core/dense_matrix.h"
 #include "lapservo/core/joint_units.h"
 #include "lapservo/core/known_keys.h"
 #include "lapservo/core/yaml_field.h"
@@ -216,7 +217,7 @@ Marker parse_marker(const YamlField& field) {
 }
 
 Rigid3 parse_transform(const YamlField& field) {
-  expect_keys(field, {{}, {"translation_m", "quaternion_xyzw"}});
+  expect_keys(field, {{"covariance"}, {"translation_m", "quaternion_xyzw"}});
   const auto t = field["translation_m"].numbers<3>("x y z in metres", 10, "a length within 10 m");
   const YamlField quaternion = field["quaternion_xyzw"];
   const auto q = quaternion.numbers<4>("x y z w of a unit quaternion");
@@ -226,6 +227,18 @@ Rigid3 parse_transform(const YamlField& field) {
   // A normalised quaternion keeps its bits, however often a rig is written and read.
   const bool unit = std::abs(rotation.squaredNorm() - 1) < 1e-14;
   return {unit ? rotation : rotation.normalized(), {t[0], t[1], t[2]}};
+}
+
+Eigen::Matrix<double, 6, 6> parse_registration_covariance(const YamlField& field) {
+  constexpr auto expected = "36 numbers, a covariance of x y z [m] and rotations about x y z [rad]";
+  const auto numbers = parse_matrix<36>(field, 6, 6, expected);
+  const Eigen::Matrix<double, 6, 6> given(numbers.data());
+  const Eigen::Matrix<double, 6, 6> covariance = (given + given.transpose()) / 2;
+  const double rounding = 1e-9 * covariance.cwiseAbs().maxCoeff();
+  if (!((given - covariance).cwiseAbs().maxCoeff() <= rounding) ||
+      !(eigenvalues_of_symmetric(covariance).minCoeff() >= -rounding))
+    field.fail("not symmetric, or of negative variance", expected);
+  return covariance;
 }
 
 // One that can head a column of our tables.
@@ -267,6 +280,8 @@ Instrument parse_instrument(const YamlField& field) {
     instrument.camera_from_rcm = parse_transform(transform);
     instrument.sigma_translation_m = sigmas_in<3>(transform, "sigma_translation_m");
     instrument.sigma_quaternion_xyzw = sigmas_in<4>(transform, "sigma_quaternion_xyzw");
+    if (const YamlField covariance = transform["covariance"]; covariance.present())
+      instrument.registration_covariance = parse_registration_covariance(covariance);
   }
   if (const YamlField joints = field["joints"]; joints.present()) instrument.joints = parse_joints(joints);
   if (const YamlField delay = field["image_delay_s"]; delay.present())

@@ -31,6 +31,8 @@ struct Instrument {
   std::optional<double> image_delay_s{};  ///< a frame's stamp minus the joints' clock at its exposure
   std::optional<std::array<double, 3>> sigma_translation_m{};  ///< of camera_from_rcm
   std::optional<std::array<double, 4>> sigma_quaternion_xyzw{};
+  /// Covariance of its translation [m], then of a rotation vector about the camera's axes [rad].
+  std::optional<Eigen::Matrix<double, 6, 6>> registration_covariance{};
   std::optional<double> sigma_image_delay_s{};
   bool operator==(const Instrument&) const = default;
 };

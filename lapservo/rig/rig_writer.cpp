@@ -117,6 +117,8 @@ std::string transform_yaml(const Instrument& instrument, int indent) {
   const Eigen::Quaterniond& q = instrument.camera_from_rcm->rotation;
   lines.add_measured("translation_m", std::array{t.x(), t.y(), t.z()}, instrument.sigma_translation_m);
   lines.add_measured("quaternion_xyzw", std::array{q.x(), q.y(), q.z(), q.w()}, instrument.sigma_quaternion_xyzw);
+  if (const auto& covariance = instrument.registration_covariance)
+    lines.add("covariance", matrix_text(6, std::vector<double>(covariance->data(), covariance->data() + 36)));
   return lines.text();
 }
 

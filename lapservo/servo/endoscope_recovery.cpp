@@ -271,6 +271,7 @@ void EndoscopeRecovery::start(const WaitingForStart& waiting, VisualController& 
   state_ = Watching{};
   agreeing_ = agreed_after;
   camera_from_rcm_ = rig_.instruments[0].camera_from_rcm = found->camera_from_rcm;
+  rig_.instruments[0].registration_covariance = found->covariance;
   seen_.clear();
   sees_from_start_ = true;
   ++registration_;

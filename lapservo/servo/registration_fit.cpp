@@ -8,6 +8,7 @@
 #include "lapservo/geometry/rotation.h"
 #include "lapservo/kinematics/centre_line.h"
 #include "lapservo/kinematics/rcm_kinematics.h"
+#include "lapservo/rig/registration_covariance.h"
 #include "lapservo/robot/backlash.h"
 
 namespace lapservo::internal {
@@ -187,6 +188,7 @@ std::optional<RegistrationFit> fit_registration(const Camera& camera, const Mark
   fit.newest_rms_px = rms_px(at->newest_px2, 1);
   const double worse = std::max(1.0, fit.rms_px / sigma_px);
   const Normal covariance = alike_images * worse * worse * inverse_of_symmetric(at->information);
+  fit.covariance = in_camera_axes(fit.camera_from_rcm, covariance.topLeftCorner<6, 6>());
   fit.sigma_rotation_rad = std::sqrt(covariance.topLeftCorner<3, 3>().trace());
   fit.sigma_position_m = std::sqrt(covariance.block<3, 3>(3, 3).trace());
   if (!std::isfinite(fit.sigma_rotation_rad) || !std::isfinite(fit.sigma_position_m)) return std::nullopt;

@@ -34,6 +34,8 @@ struct RegistrationPrior {
 
 struct RegistrationFit {
   Rigid3 camera_from_rcm;
+  /// Covariance of its translation [m], then of a rotation vector about the camera's axes [rad].
+  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
   double rms_px = 0;              ///< of the edges' coordinates
   double newest_rms_px = 0;       ///< of the last sighting's alone
   double sigma_position_m = 0;    ///< of the RCM: root of the squares' sum

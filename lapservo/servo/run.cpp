@@ -153,7 +153,7 @@ void run(Supervisor& arm, ImageStream& images, Clock& clock, const RunConfig& co
     tell(arm, tick.decision);
     if (tick.decision.registration != registration) {
       registration = tick.decision.registration;
-      vision->use(registration, tick.decision.camera_from_rcm);
+      vision->use(tick.decision);
     }
     withhold_contradicted(tick);
     go_on = observer.on_tick(tick);

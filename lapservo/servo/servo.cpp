@@ -71,6 +71,7 @@ ServoDecision Servo::step(const ServoInput& input) {
   recovery_->follow(counted, decision.control, controller_);
   decision.registration = recovery_->registration();
   decision.camera_from_rcm = recovery_->camera_from_rcm();
+  if (decision.registration > 0) decision.registration_covariance = recovery_->instrument().registration_covariance;
   if (const auto why = recovery_->wrong_rig()) decision.remedy = why->text(recovery_->instrument());
   return decision;
 }

@@ -31,7 +31,9 @@ struct ServoDecision {
   /// operator has started it with one that was measured anew. Images that were tracked with another one do not count.
   int registration = 0;
   std::optional<Rigid3> camera_from_rcm;  ///< nullopt until that start, and where the rig has none
-  bool release = false;                   ///< until that start the arm is the operator's: Robot::release()
+  /// Of one that was measured anew: as Instrument::registration_covariance.
+  std::optional<Eigen::Matrix<double, 6, 6>> registration_covariance;
+  bool release = false;  ///< until that start the arm is the operator's: Robot::release()
   /// The fault and its remedy, in one line, where a person has to act; else empty. With HoldReason::wrong_rig: what
   /// of the rig explains best that joints and images have disagreed from the start.
   std::string remedy;

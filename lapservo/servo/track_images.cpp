@@ -29,11 +29,12 @@ class CallersTracking : public TrackedImageStream {
     tracked.measurement.repetition = repeats_.add(tracked.image.bgr);
     return tracked;
   }
-  void use(int registration, const std::optional<Rigid3>& camera_from_rcm) override {
-    registration_ = registration;
+  void use(const ServoDecision& by) override {
+    registration_ = by.registration;
     // Where the others' are in a moved camera is not measured.
     for (Instrument& instrument : rig_.instruments) instrument.camera_from_rcm.reset();
-    rig_.instruments.front().camera_from_rcm = camera_from_rcm;
+    rig_.instruments.front().camera_from_rcm = by.camera_from_rcm;
+    rig_.instruments.front().registration_covariance = by.registration_covariance;
     tracker_ = Tracker(rig_, options_);
     rcm_px_ = rcm_image_px(rig_, std::nullopt);
   }
@@ -62,9 +63,9 @@ class OwnThreadTracking : public TrackedImageStream {
     if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
     return std::exchange(latest_, std::nullopt);
   }
-  void use(int registration, const std::optional<Rigid3>& camera_from_rcm) override {
+  void use(const ServoDecision& by) override {
     const std::lock_guard lock(mutex_);
-    wanted_ = {registration, camera_from_rcm};
+    wanted_ = by;
   }
 
  private:
@@ -72,7 +73,7 @@ class OwnThreadTracking : public TrackedImageStream {
     constexpr std::chrono::microseconds between_looks(500);
     try {
       while (!stop_) {
-        if (const auto wanted = take_wanted()) tracking_->use(wanted->registration, wanted->camera_from_rcm);
+        if (const auto wanted = take_wanted()) tracking_->use(*wanted);
         auto tracked = tracking_->newest();
         if (!tracked) {
           std::this_thread::sleep_for(between_looks);
@@ -90,11 +91,7 @@ class OwnThreadTracking : public TrackedImageStream {
     }
   }
 
-  struct Wanted {
-    int registration = 0;
-    std::optional<Rigid3> camera_from_rcm;
-  };
-  std::optional<Wanted> take_wanted() {
+  std::optional<ServoDecision> take_wanted() {
     const std::lock_guard lock(mutex_);
     return std::exchange(wanted_, std::nullopt);
   }
@@ -102,7 +99,7 @@ class OwnThreadTracking : public TrackedImageStream {
   std::unique_ptr<TrackedImageStream> tracking_;
   std::mutex mutex_;
   std::optional<TrackedImage> latest_;
-  std::optional<Wanted> wanted_;
+  std::optional<ServoDecision> wanted_;
   std::exception_ptr failure_;
   std::atomic<bool> stop_ = false;
   std::thread thread_;  // last: it uses the others

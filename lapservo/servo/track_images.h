@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 
 #include "lapservo/rig/rig.h"
+#include "lapservo/servo/servo_decision.h"
 #include "lapservo/servo/tracked_image.h"
 #include "lapservo/stream/image_stream.h"
 #include "lapservo/vision/tracker.h"
@@ -18,9 +19,9 @@ class TrackedImageStream {
   virtual ~TrackedImageStream() = default;
   /// The newest one since the last call, if any.
   virtual std::optional<TrackedImage> newest() = 0;
-  /// Images are tracked with this camera_from_rcm of the first instrument, or without one, as soon as may be; they
-  /// carry that number (ImageMeasurement::registration).
-  virtual void use(int registration, const std::optional<Rigid3>& camera_from_rcm) = 0;
+  /// Images are tracked with the decision's camera_from_rcm of the first instrument, or without one, as soon as may be;
+  /// they carry its number (ImageMeasurement::registration).
+  virtual void use(const ServoDecision& by) = 0;
 };
 
 /// Tracks a rig's instruments in the images of a stream, which must outlive it. `rcm_px`: see measurement_of(). An

@@ -199,10 +199,14 @@ Sight::Sight(const Rig& rig, const cv::Mat& bgr)
       view_(bgr_),
       classes_(rig_.instruments),
       table_(rig_.camera.response.table()),
-      light_(view_, table_, ChannelGeometry(rig.camera)) {}
+      light_(view_, table_, ChannelGeometry(rig.camera)) {
+  for (const Instrument& instrument : rig_.instruments) registrations_.push_back(registration_of(instrument));
+}
 
 Scene Sight::scene(std::size_t i) const {
-  return {view_, rig_.camera, classes_, rig_.instruments[i].marker, classes_.of_bands(i)};
+  Scene scene{view_, rig_.camera, classes_, rig_.instruments[i].marker, classes_.of_bands(i)};
+  scene.registration = registrations_[i] ? &*registrations_[i] : nullptr;
+  return scene;
 }
 
 namespace {
@@ -218,8 +222,7 @@ Shot::Shot(std::uint64_t seed, const RenderOptions& options, const Rig& of_rig)
     : rig(of_rig), q(configuration_of_seed(rig, seed)), bgr(render(rig, {q}, seed, options)), sight(rig, bgr) {}
 
 PoseUnknowns Shot::truth(bool through_rcm) const {
-  return through_rcm ? PoseUnknowns::rcm(*rig.instruments[0].camera_from_rcm, q)
-                     : PoseUnknowns::free(pose_of(rig, 0, q));
+  return {pose_of(rig, 0, q), through_rcm};
 }
 
 CentreLine Shot::line() const {
@@ -232,8 +235,14 @@ const Shot& usual_shot(std::uint64_t seed) {
   return shots.try_emplace(seed, seed).first->second;
 }
 
+JointVector q_of(const Rig& rig, const PoseUnknowns& unknowns) {
+  return internal::configuration_of(unknowns.pose(), *rig.instruments[0].camera_from_rcm).value();
+}
+
 FineFit fit_from(const Shot& shot, const PoseUnknowns& start) {
-  return fit_finely(shot.sight.scene(), shot.sight.light(), start, {});
+  Scene scene = shot.sight.scene();
+  if (!start.through_rcm()) scene.registration = nullptr;
+  return fit_finely(scene, shot.sight.light(), start, {});
 }
 
 }  // namespace lapservo::scenes

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "lapservo/core/random.h"
@@ -64,6 +65,7 @@ class Sight {
   cv::Mat bgr_;
   ImageView view_;
   ColourClasses classes_;
+  std::vector<std::optional<RcmPrior>> registrations_;
   std::array<float, 256> table_;
   LightImage light_;
 };
@@ -88,7 +90,10 @@ cv::Mat render_aberrated(const Rig& rig, const JointVector& q, std::uint64_t see
 /// The shot of a seed, rendered once for all who ask.
 const Shot& usual_shot(std::uint64_t seed);
 
-/// The fine fit to a shot, of a frame on its own.
+/// q by a fit's pose and the first instrument's registration.
+JointVector q_of(const Rig& rig, const PoseUnknowns& unknowns);
+
+/// The fine fit to a shot, of a frame on its own: without the registration from a start that is not through the RCM.
 FineFit fit_from(const Shot& shot, const PoseUnknowns& start);
 
 }  // namespace lapservo::scenes

@@ -27,7 +27,8 @@ struct Observation {
   Status status = Status::no_marker;
   std::string instrument;  ///< its name in the rig
 
-  /// Present when the instrument's camera_from_rcm is known; covariance in the order theta, phi, rho, psi.
+  /// Present when the instrument's camera_from_rcm is known; covariance in the order theta, phi, rho, psi: of the
+  /// frame's noise and of what the rig's sigmas say of registration, print, camera and response (docs/rig.md).
   struct Rcm {
     JointVector q;
     Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
@@ -54,8 +55,8 @@ struct Observation {
   EdgesCovariance edges_covariance_px2 = EdgesCovariance::Zero();
   Features features;  ///< their covariance: features_covariance()
 
-  /// Method::surface only: the probability that psi is off by more than false_rad, since the print is not the rig's or
-  /// as sigma has it.
+  /// Method::surface only: the probability that the rotation about the shaft is off by more than false_rad, since the
+  /// print is not the rig's or as sigma has it.
   std::optional<double> p_false;
 
   /// Where the fitted shaft lies, to start the next frame from and to draw. camera_from_unrolled, psi.

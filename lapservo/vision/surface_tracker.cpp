@@ -30,6 +30,7 @@ SurfaceTracker::SurfaceTracker(const Rig& rig, bool single, std::optional<double
       covers_(rig.instruments.size()),
       observations_(rig.instruments.size()) {
   others_.reserve(rig.instruments.size());
+  for (const Instrument& instrument : rig.instruments) registrations_.push_back(registration_of(instrument));
   if (rig.instruments.size() > 1)
     for (ShaftCover& cover : covers_) cover.reserve(rig.camera);
   BlurredEdges::instance();  // takes milliseconds, which no frame should
@@ -50,6 +51,7 @@ Scene SurfaceTracker::scene_of(const ImageView& image, std::size_t i) const {
   Scene scene{image, rig_.camera, classes_, rig_.instruments[i].marker, classes_.of_bands(i), others_};
   scene.known_sides = prints_[i].known_sides();
   scene.max_p_false = max_p_false_;
+  scene.registration = registrations_[i] ? &*registrations_[i] : nullptr;
   return scene;
 }
 
@@ -104,8 +106,8 @@ void SurfaceTracker::cover_found(std::size_t i, const std::vector<Blob>& blobs, 
 Found SurfaceTracker::follow_known(const ImageView& image, const LightImage& light, std::size_t i, WorkBudget& budget) {
   const InstrumentMemory& memory = *memory_[i];
   const auto follow_it = [&] {
-    Found found = follow(scene_of(image, i), light, memory.expected_pose(now_s_), memory.blur,
-                         memory.expected_processing(), budget);
+    Found found =
+        follow(scene_of(image, i), light, memory.expected_pose(now_s_), memory.blur, memory.expected(now_s_), budget);
     found.among_others = found.fit && !others_.empty();
     return found;
   };
@@ -114,17 +116,13 @@ Found SurfaceTracker::follow_known(const ImageView& image, const LightImage& lig
   Found found = follow_it();
   if (!found.fit && !memory.among_others && cover_expected(i, budget)) found = follow_it(), followed_twice_ = true;
   if (found.fit) covers_[i].clear();  // where it was expected
-  const auto& camera_from_rcm = rig_.instruments[i].camera_from_rcm;
-  if (found.fit && !found.fit->unknowns.q() && camera_from_rcm)
-    if (Found again = follow_through_rcm(scene_of(image, i), light, *found.fit, *camera_from_rcm, budget); again.fit)
-      return again;
   return found;
 }
 
 Found SurfaceTracker::look_for(const ImageView& image, const LightImage& light, const std::vector<Blob>& blobs,
                                std::size_t i, WorkBudget& budget) {
   const auto look = [&](const std::vector<Blob>& where) {
-    return searches_[i].look({scene_of(image, i), light, where, rig_.instruments[i].camera_from_rcm}, budget);
+    return searches_[i].look({scene_of(image, i), light, where}, budget);
   };
   if (others_.empty()) return look(blobs);
   Found found = look(without(blobs, others_));
@@ -189,16 +187,11 @@ const std::vector<Observation>& SurfaceTracker::track(const cv::Mat& image_bgr, 
     observations_[i].status = found.status;
     if (found.refused) observations_[i] = refused_observation(found.status, *found.refused);
     if (!found.fit) continue;
-    FineFit& fit = *found.fit;
-    const Eigen::Index psi = fit.unknowns.size() - 1;
-    const auto change_rad = memory_[i] ? memory_[i]->turn_change_rad(fit.unknowns, now_s_) : std::nullopt;
-    fit.covariance(psi, psi) += variance_of_uneven_turn(fit.turn, change_rad);
+    const FineFit& fit = *found.fit;
     memory_[i] = remembered(memory_[i], fit, found.among_others, now_s_);
     const bool is_off = !rig_.instruments[i].marker.bands_are_measured() && prints_[i].is_off();
-    if (is_off || !tells_psi(fit))
-      observations_[i] = refused_observation(is_off ? Status::marker_mismatch : Status::uncertain, fit.unknowns.pose());
-    else
-      observations_[i] = observation_of(scene_of(image, i), fit, rig_.instruments[i].camera_from_rcm);
+    observations_[i] = is_off ? refused_observation(Status::marker_mismatch, fit.unknowns.pose())
+                              : observation_of(scene_of(image, i), fit);
   }
   return observations_;
 }

@@ -20,8 +20,8 @@ namespace lapservo::internal {
 
 /// Method::surface: coarse search for the markers' colours, then a fit over all visible generatrices.
 ///
-/// With camera_from_rcm the fit's unknowns are q. Where no q explains the image (a registration that is off), the axis
-/// is fitted freely: the image features are right then, and q is given only as far as the mismatch lets it be known.
+/// A shaft is held at the RCM as well as the registration knows it. Where the image contradicts that, the shaft is fitted
+/// without it: the image features are right then, and q is given only as far as the mismatch lets it be known.
 class SurfaceTracker {
  public:
   /// `single`: every frame on its own. `frame_budget`, `max_p_false`: as TrackerOptions has them.
@@ -58,6 +58,7 @@ class SurfaceTracker {
   ChannelGeometry channels_;
   FrameClock clock_;
   double now_s_ = 0;  // of this frame
+  std::vector<std::optional<RcmPrior>> registrations_;
   std::vector<std::optional<InstrumentMemory>> memory_;
   std::vector<PrintRecord> prints_;
   std::vector<MarkerSearch> searches_;

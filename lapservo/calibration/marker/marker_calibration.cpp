@@ -110,10 +110,10 @@ class TurnFit {
     if (!adjustment) return std::nullopt;
     for (std::size_t i = 0; i < frames_.size(); ++i) {
       Sighting& sighting = frames_[i].sighting;
-      const int pose_numbers = sighting.unknowns.size();
-      sighting.unknowns = sighting.unknowns.changed_by(adjustment->steps[i].head(pose_numbers));
-      sighting.film_m = std::clamp(sighting.film_m + film_sigma_m * adjustment->steps[i][pose_numbers], 0.0,
-                                   film_mean_m + 4 * film_sigma_m);
+      const UnknownVector& step = adjustment->steps[i];
+      sighting.unknowns = sighting.unknowns.changed_by(step.head<pose_unknowns>());
+      sighting.film_m =
+          std::clamp(sighting.film_m + film_sigma_m * step[film_unknown], 0.0, film_mean_m + 4 * film_sigma_m);
       sighting.blur = measured_[i].edges.improved(sighting.blur);
     }
     if (free_print) {

@@ -145,7 +145,7 @@ std::vector<Term> terms_of(const Measurement& m, const PrintShape& shape, double
 }
 
 double moved_px(const SeamEdge& edge, double turned_rad) {
-  return edge.row[edge.row.size() - 1] * turned_rad;
+  return edge.row[psi_unknown] * turned_rad;
 }
 
 std::vector<Term> terms_of(const SeamEdge& edge, bool lower, double turned_rad, FrameUnknowns& frame,

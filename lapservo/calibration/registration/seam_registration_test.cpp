@@ -47,7 +47,7 @@ struct Turn {
           pose.camera_from_unrolled.rotation * Eigen::AngleAxisd(turned_rad, Eigen::Vector3d::UnitZ());
       pose.psi_rad = q.psi_rad - turned_rad + seam_error_rad + noise_rad * random.normal();
       KeyFrame frame;
-      frame.sighting.unknowns = PoseUnknowns::free(pose);
+      frame.sighting.unknowns = {pose, false};
       frame.time_s = time_s + 0.2;
       calibration.key_frames.push_back(frame);
     }

@@ -21,7 +21,7 @@ using scenes::Sight;
 using scenes::usual_shot;
 
 ShaftPose moved_along(const Shot& shot, double along_m) {
-  return shot.truth(true).changed_by(Eigen::Vector4d(0, 0, along_m, 0)).pose();
+  return shot.truth(true).changed_by(along_m * PoseVector::Unit(4)).pose();
 }
 
 // The frame with a stripe of blood along a boundary.

@@ -58,7 +58,8 @@ bool is_displaced(const Scene& scene, const LightImage& light, const FineFit& fi
   const DepartedLight seen(light, fit.departure);
   const EdgeMeasurements edges = measure_edges(scene, seen.light(), fit.unknowns, film_mean_m, farther, fit.blur);
   for (const std::size_t boundary : {1U, 2U})
-    if (is_doubtful(fit, boundary) && shows_elsewhere(edges, boundary, fit.bias_px[boundary], scene.marker.tolerance_m))
+    if (is_doubtful(fit, boundary) &&
+        shows_elsewhere(edges, boundary, fit.bias_px[boundary], scene.marker.boundary_sigma_m()))
       return true;
   return false;
 }

@@ -18,10 +18,11 @@ double squared(double x) {
   return x * x;
 }
 
-// Without the RCM both ends are needed: they fix the depth, and with it everything else.
-bool shows_enough(const ColourAgreement& agreement, const FineFit& fit) {
+// Without a well known RCM both ends are needed: they fix the depth, and with it everything else.
+bool shows_enough(const Scene& scene, const ColourAgreement& agreement, const FineFit& fit) {
   const int on_inner = fit.used[1] + fit.used[2];
-  const int on_ends = fit.unknowns.q() ? fit.used[0] + fit.used[3] : std::min(fit.used[0], fit.used[3]);
+  const int on_ends =
+      fit.unknowns.through_rcm() && scene.knows_rcm() ? fit.used[0] + fit.used[3] : std::min(fit.used[0], fit.used[3]);
   return agreement.matching >= limits.min_matching && std::min(on_inner, on_ends) >= limits.min_lines;
 }
 
@@ -50,21 +51,12 @@ bool has_right_psi(const Scene& scene, const FineFit& fit) {
 Status validate_psi(const Scene& scene, const FineFit& fit) {
   const double limit = squared(limits.max_sigma_psi_rad), by_tolerance = fit.psi_variance_by_tolerance;
   if (fit.off_probability > limits.certainly_off || (by_tolerance < limit && misses_a_boundary(scene, fit)))
-    return is_well_seen(fit) ? Status::marker_mismatch : Status::uncertain;
+    return fit.is_well_seen() ? Status::marker_mismatch : Status::uncertain;
   const bool is_sure = fit.psi_variance_rad2() < limit + limits.tolerance_slack * by_tolerance;
   return is_sure && has_right_psi(scene, fit) ? Status::ok : Status::uncertain;
 }
 
 }  // namespace
-
-bool is_well_seen(const FineFit& fit) {
-  return fit.located_fraction() > limits.well_seen_fraction;
-}
-
-bool tells_psi(const FineFit& fit) {
-  return fit.psi_variance_rad2() <
-         squared(limits.max_sigma_told_rad) + limits.tolerance_slack * fit.psi_variance_by_tolerance;
-}
 
 ColourAgreement colour_agreement(const Scene& scene, const ShaftPose& pose) {
   constexpr int azimuths = 13, places = 40;
@@ -106,7 +98,7 @@ Status validate(const Scene& scene, const FineFit& fit) {
   if (!fit.converged) return Status::poor_fit;
   const ColourAgreement agreement = colour_agreement(scene, fit.unknowns.pose());
   const bool is_cut = agreement.in_image < limits.wholly_in_image && scene.others.empty();
-  if (!shows_enough(agreement, fit)) return is_cut ? Status::cut : Status::occluded;
+  if (!shows_enough(scene, agreement, fit)) return is_cut ? Status::cut : Status::occluded;
   if (agreement.wrong > limits.max_wrong || !agrees_well(fit)) return Status::poor_fit;
   return validate_psi(scene, fit);
 }

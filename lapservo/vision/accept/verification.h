@@ -9,17 +9,14 @@ namespace lapservo::internal {
 /// When a fit is good enough to move a robot by. That psi is right, sigma and p_false say; what they can't know is
 /// whether it is the marker that was fitted. How many wrong ones pass: docs/notes/accuracy.md, "False accepts".
 struct ValidationLimits {
-  double max_sigma_psi_rad = 0.02;  ///< five sigma: a tenth of a radian, from which on psi counts as wrong
-  /// And of psi as it is told, with what a turn within the exposure adds.
-  double max_sigma_told_rad = 0.04;
-  double certainly_off = 0.9;  ///< probability from which on the print is to blame
+  double max_sigma_psi_rad = 0.03;  ///< a third of what counts as wrong
+  double certainly_off = 0.9;       ///< probability from which on the print is to blame
   /// Times what the rig's tolerance_m adds to the variance and to p_false: who sets it wants to live with it.
   double tolerance_slack = 1.5;
-  double well_seen_fraction = 0.7;  ///< of the boundary points, to blame the print
-  double wholly_in_image = 0.98;    ///< of the visible surface: what is missing is hidden, not cut
-  double min_matching = 0.3;        ///< of the samples on the marker, with their band's colour
-  double max_wrong = 0.05;          ///< of them, with another band's
-  int min_lines = 6;  ///< on which the inner boundaries are located, and the ends; without the RCM each end
+  double wholly_in_image = 0.98;  ///< of the visible surface: what is missing is hidden, not cut
+  double min_matching = 0.3;      ///< of the samples on the marker, with their band's colour
+  double max_wrong = 0.05;        ///< of them, with another band's
+  int min_lines = 6;              ///< on which the inner boundaries are located, and the ends; without the RCM each end
   /// Of a boundary's lines in clear view: located on fewer, it is not where it should be.
   double missed_fraction = 0.3;
   /// Wrong fits agree with few boundaries or sides, and badly; blood leaves few, which agree well; compression leaves
@@ -35,12 +32,6 @@ struct ColourAgreement {
   double in_image = 0;  ///< fraction of the visible surface that lies inside the image
 };
 ColourAgreement colour_agreement(const Scene& scene, const ShaftPose& pose);
-
-/// Enough of the boundary points are located to blame the print or the registration.
-bool is_well_seen(const FineFit& fit);
-
-/// Whether sigma of psi, as it is told, is small enough to be of use.
-bool tells_psi(const FineFit& fit);
 
 /// Whether a fit is good enough to move a robot by: Status::ok, or why not.
 Status validate(const Scene& scene, const FineFit& fit);

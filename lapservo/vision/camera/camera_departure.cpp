@@ -301,4 +301,15 @@ std::optional<CameraDeparture> find_departure(const LightImage& light, std::span
   return std::nullopt;
 }
 
+std::array<double, 4> moved_by_exponent_px(const LightImage& light, std::span<const Measurement> measurements,
+                                           double blur_px) {
+  const PooledEdges edges = pool_edges(light, measurements, in_light);
+  SeenBoundaries seen = seen_in(light.channels(), edges, blur_px, as_it_is);
+  differ_by_exponent(blur_px, seen);
+  std::array<double, 4> moved_px{};
+  for (const SeenBoundary& boundary : seen)
+    moved_px[boundary.edge->boundary] = (boundary.share * boundary.by_exponent_px).sum();
+  return moved_px;
+}
+
 }  // namespace lapservo::internal

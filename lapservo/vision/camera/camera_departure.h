@@ -85,4 +85,9 @@ class DepartedLight {
 std::optional<CameraDeparture> find_departure(const LightImage& light, std::span<const Measurement> measurements,
                                               const PooledEdges& glance, double blur_px);
 
+/// By how much each boundary is seen farther along its normal, by an exponent of light that is larger by 1 [px]; 0
+/// where it is not seen. `blur_px`: what fit_step was told.
+std::array<double, 4> moved_by_exponent_px(const LightImage& light, std::span<const Measurement> measurements,
+                                           double blur_px);
+
 }  // namespace lapservo::internal

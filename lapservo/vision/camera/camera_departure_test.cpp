@@ -36,13 +36,13 @@ CameraEffects rec709() {
   return camera;
 }
 
-FineFit fit_to(const Shot& shot, const cv::Mat& bgr, const ExpectedProcessing& expected = {}) {
+FineFit fit_to(const Shot& shot, const cv::Mat& bgr, const Expected& expected = {}) {
   const Sight sight(shot.rig, bgr);
   return fit_finely(sight.scene(), sight.light(), shot.truth(true), {}, expected);
 }
 
 double psi_error_rad(const Shot& shot, const FineFit& fit) {
-  return std::abs(wrap_pi(fit.unknowns.q().value().psi_rad - shot.q.psi_rad));
+  return std::abs(wrap_pi(scenes::q_of(shot.rig, fit.unknowns).psi_rad - shot.q.psi_rad));
 }
 
 // psi of frames through a camera that the rig does not know, beside that of fits that do not ask.
@@ -50,9 +50,8 @@ struct Errors {
   std::vector<double> asked_rad, unasked_rad, sigmas;
 
   void add(const Shot& shot, const cv::Mat& seen, const FineFit& fit) {
-    const Eigen::Index psi = fit.unknowns.size() - 1;
     asked_rad.push_back(psi_error_rad(shot, fit));
-    sigmas.push_back(asked_rad.back() / std::sqrt(fit.covariance(psi, psi)));
+    sigmas.push_back(asked_rad.back() / std::sqrt(fit.psi_variance_rad2()));
     unasked_rad.push_back(psi_error_rad(shot, fit_to(shot, seen, {.ask = false})));
   }
 };
@@ -117,7 +116,7 @@ TEST(CameraDeparture, IsKeptByFramesThatAreNotAsked) {
   ASSERT_TRUE(first.departure.any());
   const FineFit next = fit_to(shot, seen, {.ask = false, .departure = first.departure});
   EXPECT_EQ(next.departure.aberration, first.departure.aberration);
-  EXPECT_NEAR(next.unknowns.q().value().psi_rad, first.unknowns.q().value().psi_rad, 3e-4);
+  EXPECT_NEAR(scenes::q_of(shot.rig, next.unknowns).psi_rad, scenes::q_of(shot.rig, first.unknowns).psi_rad, 3e-4);
   const FineFit again = fit_to(shot, seen, {.ask = true, .departure = first.departure});
   EXPECT_NEAR(again.departure.aberration.blue, first.departure.aberration.blue, 3e-4);
 }

@@ -9,6 +9,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "lapservo/core/angles.h"
 #include "lapservo/geometry/response.h"
 #include "lapservo/testing/camera_effects.h"
 #include "lapservo/testing/scenes.h"
@@ -269,7 +270,8 @@ double mean_error_rad(const effects::CameraEffects& effects, bool ask) {
     const FineFit fit = fit_through(effects, seed, ask);
     EXPECT_TRUE(fit.converged);
     EXPECT_EQ(fit.processing, ask ? Processing::found : Processing::unknown);
-    sum_rad += fit.unknowns.q()->psi_rad - scenes::usual_shot(seed).q.psi_rad;
+    const scenes::Shot& shot = scenes::usual_shot(seed);
+    sum_rad += wrap_pi(scenes::q_of(shot.rig, fit.unknowns).psi_rad - shot.q.psi_rad);
   }
   return sum_rad / static_cast<double>(shots);
 }
@@ -295,7 +297,7 @@ TEST(PictureProcessing, ClippedColoursDoNotMoveTheRotation) {
     const FineFit fit = fit_finely(sight.scene(), sight.light(), shot.truth(true), {}, {.ask = true});
     ASSERT_TRUE(fit.converged);
     EXPECT_EQ(fit.processing, Processing::found);
-    const double error_rad = fit.unknowns.q()->psi_rad - shot.q.psi_rad;
+    const double error_rad = wrap_pi(scenes::q_of(shot.rig, fit.unknowns).psi_rad - shot.q.psi_rad);
     EXPECT_LT(std::abs(error_rad), 6e-3);
     squares += error_rad * error_rad;
   }
@@ -338,8 +340,8 @@ TEST(PictureProcessing, ChromaBesideItsPlaceDoesNotMoveTheRotation) {
         const scenes::Sight sight(shot.rig, with_chroma_moved(seen, right_px, down_px));
         const FineFit fit = fit_finely(sight.scene(), sight.light(), shot.truth(true), {}, {.ask = true});
         EXPECT_EQ(fit.processing, Processing::found);
-        const double error_rad = fit.unknowns.q()->psi_rad - shot.q.psi_rad;
-        sum_rad += error_rad, squared_sigmas += error_rad * error_rad / fit.covariance(3, 3);
+        const double error_rad = wrap_pi(scenes::q_of(shot.rig, fit.unknowns).psi_rad - shot.q.psi_rad);
+        sum_rad += error_rad, squared_sigmas += error_rad * error_rad / fit.psi_variance_rad2();
       }
       EXPECT_LT(std::abs(sum_rad / static_cast<double>(shots)), 1.5e-3);
       EXPECT_LT(std::sqrt(squared_sigmas / static_cast<double>(shots)), 1.5);

@@ -109,7 +109,7 @@ double error_over_sigma(const Rig& rig, double along_px, double across_px) {
       const FineFit fit = fit_finely(sight.scene(), sight.light(), shot.truth(true), {1.2, 1.2});
       EXPECT_TRUE(fit.converged) << "seed " << seed;
       const double error_rad = wrap_pi(fit.unknowns.pose().psi_rad - shot.q.psi_rad);
-      squares += error_rad * error_rad / fit.covariance(3, 3) / (2 * shots);
+      squares += error_rad * error_rad / fit.psi_variance_rad2() / (2 * shots);
     }
   }
   return std::sqrt(squares);

@@ -96,9 +96,9 @@ bool lies_behind_another(const Frame& frame, const EdgeLine& line, const Generat
 // Measurement::row of a point, moving along `pull` [px/m], with its parts by psi and by the film.
 UnknownVector row_of(const PoseUnknowns& unknowns, const Eigen::Vector3d& point, const Eigen::Vector3d& pull,
                      double by_psi, double by_film) {
-  UnknownVector row = unknowns.row(point, pull, 1);
-  row[unknowns.size() - 1] = by_psi;
-  row[unknowns.size()] = by_film;
+  UnknownVector row = unknowns.row(point, pull);
+  row[psi_unknown] = by_psi;
+  row[film_unknown] = by_film;
   return row;
 }
 
@@ -272,7 +272,7 @@ void see_film(const Frame& frame, std::size_t k, double even_light, const EdgeBl
     const FilmShift shift = film_shift(matt - gloss.begin()[at], std::abs(width_px) / blur_px);
     const double shift_px = shift.fraction * width_px;
     Measurement& m = place.measurement;
-    m.row[m.row.size() - 1] += (shift.by_width - place.film_shift) * film_sigma_m * place.film_px_per_m;
+    m.row[film_unknown] += (shift.by_width - place.film_shift) * film_sigma_m * place.film_px_per_m;
     place.film_moved_px = shift_px - place.film_shift * width_px;
     // What gloss takes off is no better known.
     const double doubted_px = std::max(std::abs(shift_px), std::abs(matt * width_px));

@@ -22,7 +22,7 @@ TEST(EdgeMeasurements, WhatTheLensFoldsIntoTheImageIsNotLookedFor) {
   ShaftPose pose = scenes::usual_shot(1).truth(true).pose();
   pose.camera_from_unrolled.translation = Eigen::Vector3d(0.18, 0, 0.1);
   const EdgeMeasurements edges =
-      measure_edges(sight.scene(), sight.light(), PoseUnknowns::free(pose), film_mean_m, effort, {});
+      measure_edges(sight.scene(), sight.light(), PoseUnknowns(pose, false), film_mean_m, effort, {});
   EXPECT_EQ(edges.in_image, (std::array<int, 4>{}));
   EXPECT_EQ(edges.sides_in_image, 0);
 }

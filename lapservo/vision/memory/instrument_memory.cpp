@@ -2,8 +2,6 @@
 
 #include <algorithm>
 
-#include "lapservo/core/angles.h"
-
 namespace lapservo::internal {
 namespace {
 
@@ -17,7 +15,7 @@ LookSchedule schedule_after(const FineFit& fit, LookSchedule schedule) {
 
 }  // namespace
 
-UnknownVector InstrumentMemory::expected_step(double at_s) const {
+PoseVector InstrumentMemory::expected_step(double at_s) const {
   constexpr double most_steps = 4;  // hands and arms do not move evenly for longer
   const double steps = step_s > 0 ? std::clamp((at_s - time_s) / step_s, 0.0, most_steps) : 0;
   return steps * step;
@@ -27,24 +25,24 @@ PoseUnknowns InstrumentMemory::expected_pose(double at_s) const {
   return last.changed_by(expected_step(at_s));
 }
 
-std::optional<double> InstrumentMemory::turn_change_rad(const PoseUnknowns& unknowns, double at_s) const {
-  if (!(step_s > 0) || !unknowns.q()) return std::nullopt;
-  const double expected_rad = last.q()->psi_rad + expected_step(at_s)[unknowns.size() - 1];
-  return wrap_pi(unknowns.q()->psi_rad - expected_rad);
+Expected InstrumentMemory::expected(double at_s) const {
+  Expected expected{looks.is_due(), bias_px, departure, blur.boundaries_px()};
+  if (step_s > 0) expected.moved_on = expected_pose(at_s);
+  return expected;
 }
 
 InstrumentMemory remembered(const std::optional<InstrumentMemory>& before, const FineFit& fit, bool among_others,
                             double time_s) {
   InstrumentMemory memory{.time_s = time_s,
                           .last = fit.unknowns,
-                          .step = UnknownVector::Zero(fit.unknowns.size()),
+                          .step = PoseVector::Zero(),
                           .blur = fit.blur,
                           .looks = schedule_after(fit, before ? before->looks : LookSchedule{}),
                           .bias_px = fit.bias_px,
                           .departure = fit.departure,
                           .among_others = among_others};
-  if (before && before->last.q() && fit.unknowns.q()) {
-    memory.step = fit.unknowns.q()->vector() - before->last.q()->vector();
+  if (before && before->last.through_rcm() == fit.unknowns.through_rcm()) {
+    memory.step = before->last.change_to(fit.unknowns);
     memory.step_s = time_s - before->time_s;
   }
   return memory;

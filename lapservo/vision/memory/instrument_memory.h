@@ -15,22 +15,20 @@ namespace lapservo::internal {
 struct InstrumentMemory {
   double time_s;
   PoseUnknowns last;
-  UnknownVector step;  ///< of the unknowns, from the frame before
-  double step_s = 0;   ///< which took so long; 0 where none was found before
+  PoseVector step;    ///< of the unknowns, from the frame before
+  double step_s = 0;  ///< which took so long; 0 where none was found before
   EdgeBlur blur;
   LookSchedule looks;
   std::array<double, 4> bias_px{};
   CameraDeparture departure;
   bool among_others = false;  ///< Found::among_others
 
-  ExpectedProcessing expected_processing() const { return {looks.is_due(), bias_px, departure, blur.boundaries_px()}; }
+  Expected expected(double at_s) const;
   /// Where it is when it moves on as it did, for some steps at most.
   PoseUnknowns expected_pose(double at_s) const;
-  /// By how much psi differs from there. Nullopt where no step is known, or without q.
-  std::optional<double> turn_change_rad(const PoseUnknowns& unknowns, double at_s) const;
 
  private:
-  UnknownVector expected_step(double at_s) const;
+  PoseVector expected_step(double at_s) const;
 };
 
 /// After a frame in which it was found.

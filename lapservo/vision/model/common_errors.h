@@ -9,6 +9,7 @@
 #include "lapservo/vision/edges/edge_measurements.h"
 #include "lapservo/vision/model/print_doubt.h"
 #include "lapservo/vision/model/residual_lines.h"
+#include "lapservo/vision/model/rig_errors.h"
 
 namespace lapservo::internal {
 
@@ -66,6 +67,7 @@ struct CommonErrors {
     return m.group < 4 ? boundary_noise_scale : std::max(1.0, boundary_noise_scale);
   }
   PrintDoubt doubt;
+  RigErrors rig;
 };
 
 /// What a boundary of this blur as a whole may be off beside a camera's processing, on a shaft of this radius.

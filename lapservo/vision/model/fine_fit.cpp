@@ -7,10 +7,12 @@
 #include <span>
 #include <utility>
 
+#include "lapservo/core/angles.h"
 #include "lapservo/vision/camera/camera_look.h"
 #include "lapservo/vision/model/common_errors.h"
 #include "lapservo/vision/model/normal_equations.h"
 #include "lapservo/vision/model/residual_lines.h"
+#include "lapservo/vision/model/turn_blur.h"
 
 namespace lapservo::internal {
 namespace {
@@ -21,21 +23,20 @@ double robust_weight(const Measurement& m, double residual_px) {
   return cauchy_weight(residual_px / m.sigma_px, cauchy_scale_sigmas) / (m.sigma_px * m.sigma_px);
 }
 
-// Minimises the robust cost of linearised measurements: iteratively reweighted. The unknowns are the pose's, then the
-// film's thickness in film_sigma_m; `film_prior` is what that lies below its expected one.
-template <int Size>
-UnknownVector solve(std::span<const Measurement> measurements, double film_prior) {
+// Minimises the robust cost of linearised measurements: iteratively reweighted. `film_prior` is what the film's
+// thickness lies below its expected one, in film_sigma_m.
+UnknownVector solve(std::span<const Measurement> measurements, const std::optional<RcmMeasurement>& rcm,
+                    double film_prior) {
   constexpr int max_iterations = 4;
-  using Row = Eigen::Matrix<double, Size, 1>;
-  Row step = Row::Zero();
+  UnknownVector step = UnknownVector::Zero();
   for (int i = 0; i < max_iterations; ++i) {
-    NormalEquations equations(Size);
-    equations.add(Row::Unit(Size - 1), film_prior, 1);
-    for (const Measurement& m : measurements) {
-      const Row row = m.row.head<Size>();
-      equations.add(row, m.residual_px, robust_weight(m, m.residual_px - row.dot(step)));
-    }
-    const Row next = equations.solve(1e-9), change = next - step;
+    NormalEquations equations;
+    equations.add(UnknownVector::Unit(film_unknown), film_prior, 1);
+    for (const Measurement& m : measurements)
+      equations.add(m.row, m.residual_px, robust_weight(m, m.residual_px - m.row.dot(step)));
+    if (rcm)
+      for (const int across : {0, 1}) equations.add(rcm->rows.row(across), rcm->residual[across], 1);
+    const UnknownVector next = equations.solve(1e-9), change = next - step;
     step = next;
     if (change.dot(equations.information() * change) < fine_fit_limits.settled_sigmas * fine_fit_limits.settled_sigmas)
       break;
@@ -72,23 +73,32 @@ class Fitter {
   Fitter(const Scene& scene, const LightImage& light, FineFit& fit) : scene_(scene), light_(light), fit_(fit) {}
   // Each returns whether to go on; what is known by then is in the result.
   bool settle();
-  bool see_camera(const ExpectedProcessing& expected);
-  void judge();
+  bool see_camera(const Expected& expected);
+  void judge(const Expected& expected);
+  // Held at the RCM, or let go of it, as the image says.
+  bool corrects_registration();
 
  private:
   static constexpr Effort capture{5, 5, 3, 3}, approach{4, 4, 6, 3}, measure_all{2, 0, 1, 1};
 
-  int unknowns() const { return fit_.unknowns.size(); }
+  // Present when the scene has a registration.
+  std::optional<RcmMeasurement> rcm() const {
+    if (!scene_.registration) return std::nullopt;
+    return scene_.registration->of(fit_.unknowns.pose(), fine_fit_limits.least_rcm_sigma_m);
+  }
+  int unheld_unknowns() const { return fit_.unknowns.through_rcm() ? pose_unknowns - 2 : pose_unknowns; }
   double film_prior() const { return (film_mean_m - film_m_) / film_sigma_m; }
   double move();
   Change take_blur(const EdgeBlur& improved);
   std::optional<Change> refine(const Effort& effort);
   bool refine_until_settled(int least_passes);
-  bool is_blurred_otherwise(const ExpectedProcessing& expected) const;
+  bool is_blurred_otherwise(const Expected& expected) const;
   void take_processing_off(const ProcessedEdges& edges);
   std::array<double, 4> departure_px() const;
+  CommonErrors errors_of(const ResidualLines& lines) const;
   void count_inliers();
   void tell(const PrintFit& print);
+  void count_turn(const Expected& expected);
 
   const Scene& scene_;
   const LightImage& light_;
@@ -101,7 +111,7 @@ class Fitter {
 
 // To where the measurements are; how far the farthest of them moved [px].
 double Fitter::move() {
-  const UnknownVector step = unknowns() == 4 ? solve<5>(pass_.all, film_prior()) : solve<7>(pass_.all, film_prior());
+  const UnknownVector step = solve(pass_.all, fit_.unknowns.through_rcm() ? rcm() : std::nullopt, film_prior());
   double farthest_px = 0;
   for (Measurement& m : pass_.all) {
     const double shift_px = m.row.dot(step);
@@ -109,8 +119,8 @@ double Fitter::move() {
     m.expected_px += static_cast<float>(shift_px) * m.normal;
     farthest_px = std::max(farthest_px, std::abs(shift_px));
   }
-  fit_.unknowns = fit_.unknowns.changed_by(step.head(unknowns()));
-  film_m_ = std::clamp(film_m_ + step[unknowns()] * film_sigma_m, 0.0, film_mean_m + 4 * film_sigma_m);
+  fit_.unknowns = fit_.unknowns.changed_by(step.head<pose_unknowns>());
+  film_m_ = std::clamp(film_m_ + step[film_unknown] * film_sigma_m, 0.0, film_mean_m + 4 * film_sigma_m);
   return farthest_px;
 }
 
@@ -133,7 +143,7 @@ std::optional<Change> Fitter::refine(const Effort& effort) {
   located_with_ = fit_.blur;
   const DepartedLight seen(light_, fit_.departure);
   pass_ = measure_edges(scene_, seen.light(), fit_.unknowns, film_m_, effort, located_with_);
-  if (static_cast<int>(pass_.all.size()) < 2 * unknowns()) return std::nullopt;
+  if (static_cast<int>(pass_.all.size()) < 2 * unheld_unknowns()) return std::nullopt;
   const double moved_px = move();
   Change change = take_blur(pass_.improved(fit_.blur));
   change.points_px = moved_px;
@@ -158,11 +168,11 @@ bool Fitter::refine_until_settled(int least_passes) {
   return settled;
 }
 
-bool Fitter::is_blurred_otherwise(const ExpectedProcessing& expected) const {
+bool Fitter::is_blurred_otherwise(const Expected& expected) const {
   return expected.blur_px && std::abs(fit_.blur.boundaries_px() / *expected.blur_px - 1) > fine_fit_limits.other_blur;
 }
 
-bool Fitter::see_camera(const ExpectedProcessing& expected) {
+bool Fitter::see_camera(const Expected& expected) {
   fit_.asked = expected.ask || is_blurred_otherwise(expected);
   for (int i = 0; fit_.asked; ++i) {
     SeenCamera camera = look_at_camera(light_, pass_.all, located_with_.boundaries_px(), fit_.departure);
@@ -186,21 +196,45 @@ void Fitter::take_processing_off(const ProcessedEdges& edges) {
   move();
 }
 
-void Fitter::judge() {
-  fit_.turn = turn_blur(pass_, located_with_, fit_.processing == Processing::found);
+void Fitter::judge(const Expected& expected) {
   fit_.lines = pass_.lines;
   fit_.in_image = pass_.in_image;
   fit_.sides_in_image = pass_.sides_in_image;
   const ResidualLines lines = residual_lines(pass_.all);
   const auto tau_rad = facing_tau_rad(scene_.marker, fit_.unknowns.pose());
   const bool is_known = tau_rad && scene_.known_sides[print_side(*tau_rad)];
-  const auto print = fit_print(pass_.all, lines, unknowns(), film_prior(), scene_.marker, is_known,
-                               common_errors(pass_, lines, fit_.blur, processed_, fit_.bias_px, departure_px()));
+  const bool through_rcm = fit_.unknowns.through_rcm();
+  const auto print =
+      fit_print(pass_.all, lines, rcm(), through_rcm, film_prior(), scene_.marker, is_known, errors_of(lines));
   if (!print) return;
-  fit_.as_the_rig_says = fit_.unknowns.changed_by(print->step_as_the_rig_says.head(unknowns()));
-  fit_.unknowns = fit_.unknowns.changed_by(print->step.head(unknowns()));
+  fit_.as_the_rig_says = fit_.unknowns.changed_by(print->step_as_the_rig_says.head<pose_unknowns>());
+  fit_.unknowns = fit_.unknowns.changed_by(print->step.head<pose_unknowns>());
   count_inliers();
   tell(*print);
+  count_turn(expected);
+}
+
+// What a turn within the exposure adds to sigma.
+void Fitter::count_turn(const Expected& expected) {
+  const TurnBlur turn = turn_blur(pass_, located_with_, fit_.processing == Processing::found);
+  const auto change_rad = expected.moved_on
+                              ? std::optional(wrap_pi(expected.moved_on->change_to(fit_.unknowns)[psi_unknown]))
+                              : std::nullopt;
+  fit_.covariance(psi_unknown, psi_unknown) += variance_of_uneven_turn(turn, change_rad);
+  fit_.p_false = std::max(fit_.p_false, p_false_of(0, fit_.psi_variance_rad2()));
+}
+
+CommonErrors Fitter::errors_of(const ResidualLines& lines) const {
+  CommonErrors errors = common_errors(pass_, lines, fit_.blur, processed_, fit_.bias_px, departure_px());
+  if (!has_sigmas(scene_.camera)) return errors;
+  std::array<double, 4> by_exponent_px{};
+  // An exponent that the image shows has a sigma of its own.
+  if (scene_.camera.response.sigma && fit_.departure.exponent == 1) {
+    const DepartedLight seen(light_, fit_.departure);
+    by_exponent_px = moved_by_exponent_px(seen.light(), pass_.all, located_with_.boundaries_px());
+  }
+  errors.rig = RigErrors(scene_.camera, by_exponent_px);
+  return errors;
 }
 
 // By how much what is left of the departure may move each boundary.
@@ -218,7 +252,17 @@ std::array<double, 4> Fitter::departure_px() const {
   return doubt_px;
 }
 
+bool Fitter::corrects_registration() {
+  if (!scene_.registration || !fit_.converged) return false;
+  const bool contradicted = fit_.is_well_seen() && fit_.rcm_missed_sigmas > fine_fit_limits.contradicted_sigmas;
+  if (contradicted != fit_.unknowns.through_rcm()) return false;
+  fit_.unknowns = fit_.unknowns.with_rcm(!contradicted);
+  fit_.converged = false;
+  return refine_until_settled(1);
+}
+
 void Fitter::count_inliers() {
+  fit_.used.fill(0), fit_.sides_used = 0;
   double squares = 0;
   int inliers = 0;
   for (const Measurement& m : pass_.all) {
@@ -231,6 +275,8 @@ void Fitter::count_inliers() {
 }
 
 void Fitter::tell(const PrintFit& print) {
+  fit_.rcm_missed_sigmas = print.rcm_missed_sigmas;
+  if (scene_.registration) fit_.with_registration = print.by_rcm_m * scene_.registration->covariance.topRows<3>();
   fit_.covariance = print.covariance;
   fit_.off_probability = print.off_probability;
   fit_.p_false = print.p_false, fit_.p_false_by_tolerance = print.p_false_by_tolerance;
@@ -251,13 +297,15 @@ double FineFit::located_fraction() const {
 }
 
 FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknowns& start, EdgeBlur blur,
-                   const ExpectedProcessing& expected) {
+                   const Expected& expected) {
   FineFit fit;
   fit.unknowns = start;
   fit.blur = blur;
   fit.departure = expected.departure;
   Fitter fitter(scene, light, fit);
-  if (fitter.settle() && fitter.see_camera(expected)) fitter.judge();
+  if (!fitter.settle() || !fitter.see_camera(expected)) return fit;
+  fitter.judge(expected);
+  if (fitter.corrects_registration()) fitter.judge(expected);
   return fit;
 }
 

@@ -8,7 +8,6 @@
 #include "lapservo/vision/edges/edge_measurements.h"
 #include "lapservo/vision/image/light_image.h"
 #include "lapservo/vision/model/print_fit.h"
-#include "lapservo/vision/model/turn_blur.h"
 #include "lapservo/vision/shaft/scene.h"
 #include "lapservo/vision/shaft/shaft_pose.h"
 
@@ -26,14 +25,20 @@ struct FineFitLimits {
   double sharp_blur_px = 1.8;        ///< a blur below it may flicker where few sides are left
   double settled_sigmas = 0.01;      ///< a reweighting that moves the unknowns by less is the last
   double other_blur = 0.05;          ///< a change of the mean blur from one frame to the next, a fraction of it
+  double well_seen_fraction = 0.7;   ///< of the boundary points, to blame the print or the registration
+  double contradicted_sigmas = 5;    ///< by so many the shaft misses an RCM that is elsewhere
+  double least_rcm_sigma_m = 1e-7;   ///< of an exact registration: a hundredth of what images tell
 };
 inline constexpr FineFitLimits fine_fit_limits;
 
 struct FineFit {
   bool converged = false;
   PoseUnknowns unknowns;
-  PoseUnknowns as_the_rig_says;  ///< the pose, were the print exactly so
-  UnknownMatrix covariance;      ///< of the unknowns, one sigma squared
+  PoseUnknowns as_the_rig_says;                ///< the pose, were the print exactly so
+  PoseMatrix covariance = PoseMatrix::Zero();  ///< of the unknowns, one sigma squared
+  /// Covariance of the unknowns with the registration's numbers (RcmPrior).
+  Eigen::Matrix<double, pose_unknowns, 6> with_registration = Eigen::Matrix<double, pose_unknowns, 6>::Zero();
+  double rcm_missed_sigmas = 0;  ///< as PrintFit has it
   EdgeBlur blur;
   int lines = 0;                  ///< generatrices looked at
   std::array<int, 4> used{};      ///< of them, lines on which the boundary was located and agrees with the fit
@@ -50,30 +55,34 @@ struct FineFit {
   int passes = 0;                               ///< in which edges were located
   std::array<double, 4> bias_px{};              ///< by how much that may have moved each boundary
   CameraDeparture departure;                    ///< from the rig's camera, as far as known
-  TurnBlur turn;                                ///< within the exposure, which the covariance knows nothing of
 
   /// Of the boundary points that the image could show, the fraction that was located.
   double located_fraction() const;
   /// Mean square of these points' residuals [sigma^2], with the inliers' limit for each that was not located: of two
   /// fits to a frame the better one has less.
   double misfit() const;
-  double psi_variance_rad2() const { return covariance(covariance.rows() - 1, covariance.cols() - 1); }
+  double psi_variance_rad2() const { return covariance(psi_unknown, psi_unknown); }
+  /// Whether enough of the boundary points are located to blame the print or the registration.
+  bool is_well_seen() const { return located_fraction() > fine_fit_limits.well_seen_fraction; }
 };
 
-/// Whether to ask what the camera did to the picture beyond its response (picture_processing.h), which costs a tenth of
-/// a tracked frame's time where it did nothing. bias_px, an earlier frame's, is what a frame that can't tell is in
-/// doubt by. `departure` is what earlier frames showed of the camera. A frame whose boundaries' mean blur is another
-/// than `blur_px` is asked in any case: the camera's sharpening may have been switched on.
-struct ExpectedProcessing {
+/// What the frames before make likely. `ask`: whether to look at what the camera did to the picture beyond its response
+/// (picture_processing.h), which costs a tenth of a tracked frame's time where it did nothing. bias_px, an earlier
+/// frame's, is what a frame that can't tell is in doubt by. `departure` is what earlier frames showed of the camera. A
+/// frame whose boundaries' mean blur is another than `blur_px` is asked in any case: the camera's sharpening may have
+/// been switched on.
+struct Expected {
   bool ask = true;
   std::array<double, 4> bias_px{};
   CameraDeparture departure = {};
   std::optional<double> blur_px = {};
+  std::optional<PoseUnknowns> moved_on = {};  ///< where the marker is if it moves as it did
 };
 
 /// Fits the pose to all boundaries on all visible generatrices and to the shaft's sides, located to a fraction of a
-/// pixel in linear light, with a robust loss. `start` must be good to some pixels.
+/// pixel in linear light, with a robust loss. `start` must be good to some pixels. The result is held at the RCM where
+/// the scene has a registration and the image does not contradict it, whatever the start is.
 FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknowns& start, EdgeBlur blur,
-                   const ExpectedProcessing& expected = {});
+                   const Expected& expected = {});
 
 }  // namespace lapservo::internal

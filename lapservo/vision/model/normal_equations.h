@@ -2,7 +2,6 @@
 
 #include <array>
 #include <optional>
-#include <type_traits>
 
 #include <Eigen/Core>
 
@@ -10,21 +9,14 @@
 
 namespace lapservo::internal {
 
-/// Gauss-Newton's normal equations of a few unknowns, gathered one scalar measurement at a time.
+/// Gauss-Newton's normal equations of a fit's unknowns, gathered one scalar measurement at a time.
 class NormalEquations {
  public:
-  explicit NormalEquations(int unknowns) : unknowns_(unknowns) {}
-
-  /// residual = measured - predicted, row = d(predicted)/d(unknowns). Rows of fixed size are several times faster.
-  template <typename Row>
-  void add(const Eigen::MatrixBase<Row>& row, double residual, double weight) {
-    constexpr bool fixed = Row::SizeAtCompileTime != Eigen::Dynamic;
-    // A copy, which no sum can alias, off the heap.
-    const std::conditional_t<fixed, Eigen::Matrix<double, Row::SizeAtCompileTime, 1>, UnknownVector> local = row;
-    const int count = fixed ? static_cast<int>(Row::SizeAtCompileTime) : unknowns_;
-    for (int i = 0; i < count; ++i) {
-      const double weighted = weight * local[i];
-      for (int j = 0; j <= i; ++j) lower_[i][j] += weighted * local[j];
+  /// residual = measured - predicted, row = d(predicted)/d(unknowns).
+  void add(const UnknownVector& row, double residual, double weight) {
+    for (int i = 0; i < fit_unknowns; ++i) {
+      const double weighted = weight * row[i];
+      for (int j = 0; j <= i; ++j) lower_[i][j] += weighted * row[j];
       gradient_[i] += weighted * residual;
     }
   }
@@ -35,9 +27,8 @@ class NormalEquations {
   UnknownVector solve(double damping) const;
 
  private:
-  int unknowns_;
-  std::array<std::array<double, max_unknowns>, max_unknowns> lower_{};
-  std::array<double, max_unknowns> gradient_{};
+  std::array<std::array<double, fit_unknowns>, fit_unknowns> lower_{};
+  std::array<double, fit_unknowns> gradient_{};
 };
 
 /// Of a symmetric positive definite matrix; nullopt when it is none to within rounding.

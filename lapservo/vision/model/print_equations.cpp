@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <utility>
 
+#include <Eigen/Cholesky>
+
 #include "lapservo/vision/model/normal_equations.h"
 
 namespace lapservo::internal {
@@ -13,23 +15,20 @@ namespace {
 // Sums over a group of the weighted products of: the row of pose and film, that of the print's errors at its two
 // edges, the residual, and 1. Of fixed size, which is several times faster; symmetric, of which the lower half is
 // summed.
-template <int Unknowns>
 class Products {
  public:
-  static constexpr int at_print = Unknowns, at_residual = at_print + 2, at_one = at_print + 3;
+  static constexpr int at_print = fit_unknowns, at_residual = at_print + 2, at_one = at_print + 3;
 
   void add(const Measurement& m, double weight) {
     Row row = Row::Zero();
-    row.template head<Unknowns>() = m.row.head<Unknowns>();
-    row.template segment<2>(at_print) = print_row(m);
+    row.head<fit_unknowns>() = m.row;
+    row.segment<2>(at_print) = print_row(m);
     row[at_residual] = m.residual_px;
     row[at_one] = 1;
     add_columns(row, weight, std::make_integer_sequence<int, at_one + 1>());
   }
-  Eigen::Matrix<double, Unknowns, Unknowns> xx() const {
-    return sums_.template topLeftCorner<Unknowns, Unknowns>().template selfadjointView<Eigen::Lower>();
-  }
-  auto x(int by) const { return sums_.row(by).template head<Unknowns>(); }
+  UnknownMatrix xx() const { return sums_.topLeftCorner<fit_unknowns, fit_unknowns>().selfadjointView<Eigen::Lower>(); }
+  auto x(int by) const { return sums_.row(by).head<fit_unknowns>(); }
   auto nx(int edge) const { return x(at_print + edge); }
   double nn(int edge, int other) const {
     return sums_(at_print + std::max(edge, other), at_print + std::min(edge, other));
@@ -49,30 +48,28 @@ class Products {
   template <int Column>
   void add_column(const Row& row, double weight) {
     constexpr int count = size - (Column - Column % 2);  // from a register's first on
-    sums_.col(Column).template tail<count>() += (weight * row[Column]) * row.template tail<count>();
+    sums_.col(Column).tail<count>() += (weight * row[Column]) * row.tail<count>();
   }
 
   Eigen::Matrix<double, size, size> sums_ = Eigen::Matrix<double, size, size>::Zero();
 };
 
 // Adds a group's products to the sums of all, and tells its pull.
-template <int Unknowns>
-GroupPull gathered(const Products<Unknowns>& products, std::size_t group, PrintEquations& all) {
-  using Of = Products<Unknowns>;
+GroupPull gathered(const Products& products, std::size_t group, PrintEquations& all) {
   GroupPull pull;
-  pull.x = products.x(Of::at_one);
+  pull.x = products.x(Products::at_one);
   pull.weight = products.weight();
   pull.residual = products.residual();
   all.xx += products.xx();
-  all.x += products.x(Of::at_residual).transpose();
+  all.x += products.x(Products::at_residual).transpose();
   if (group >= errors_of_boundary.size()) return pull;
   const auto& errors = errors_of_boundary[group];
   for (const int edge : {0, 1}) {
     const int error = errors[static_cast<std::size_t>(edge)];
     all.nx.row(error) += products.nx(edge);
     for (const int other : {0, 1}) all.nn(error, errors[static_cast<std::size_t>(other)]) += products.nn(edge, other);
-    all.n[error] += products.n(Of::at_residual, edge);
-    pull.n[error] += products.n(Of::at_one, edge);
+    all.n[error] += products.n(Products::at_residual, edge);
+    pull.n[error] += products.n(Products::at_one, edge);
   }
   return pull;
 }
@@ -85,11 +82,9 @@ double robust_certainty(const Measurement& m, const ResidualLines& lines, const 
 // All boundaries moved alike, leaning alike, or bowed alike.
 void add_pulls_of_all(std::span<const Measurement> measurements, const ResidualLines& lines, const CommonErrors& errors,
                       PrintSums& sums) {
-  const auto unknowns = sums.equations.x.size();
   const std::array<double, 3> patterns_px{errors.whole_px, errors.leaning_px, errors.bowed_px};
-  std::array<GroupPull, 3> pulls;
+  std::array<SharedPull, 3> pulls;
   std::array<double, 3> squares{};
-  for (GroupPull& pull : pulls) pull.x = UnknownVector::Zero(unknowns);
   double all = 0;
   for (const Measurement& m : measurements) {
     if (m.group >= errors_of_boundary.size()) continue;
@@ -99,7 +94,7 @@ void add_pulls_of_all(std::span<const Measurement> measurements, const ResidualL
     const std::array<double, 3> moved{1, m.across, m.across * m.across - 1.0 / 3};
     for (std::size_t i = 0; i < pulls.size(); ++i) {
       const double part = weight * moved[i];
-      pulls[i].x += part * m.row.head(unknowns);
+      pulls[i].x += part * m.row;
       for (std::size_t edge = 0; edge < 2; ++edge)
         pulls[i].n[edges[edge]] += part * by_print[static_cast<Eigen::Index>(edge)];
       squares[i] += part * moved[i];
@@ -109,42 +104,102 @@ void add_pulls_of_all(std::span<const Measurement> measurements, const ResidualL
   for (std::size_t i = 0; i < pulls.size(); ++i) {
     if (!(squares[i] > 0 && patterns_px[i] > 0)) continue;
     pulls[i].error_px = patterns_px[i] * std::sqrt(all / squares[i]);
-    sums.of_all_boundaries.push_back(pulls[i]);
+    sums.shared.push_back(pulls[i]);
   }
 }
 
-template <int Unknowns>
-PrintSums print_sums_of(std::span<const Measurement> measurements, const ResidualLines& lines, double film_prior,
-                        const CommonErrors& errors) {
-  std::array<Products<Unknowns>, measurement_groups> products;
-  for (const Measurement& m : measurements) products[m.group].add(m, robust_certainty(m, lines, errors));
-  PrintSums sums{PrintEquations(Unknowns), {}, {}};
-  for (std::size_t group = 0; group < measurement_groups; ++group) {
-    sums.pulls[group] = gathered(products[group], group, sums.equations);
-    sums.pulls[group].error_px = errors.px[group];
+// One sigma of each number of the rig's camera.
+void add_pulls_of_camera(std::span<const Measurement> measurements, const ResidualLines& lines,
+                         const CommonErrors& errors, PrintSums& sums) {
+  std::array<SharedPull, RigErrors::most> pulls;
+  for (const Measurement& m : measurements) {
+    const RigErrors::Shifts shifts = robust_certainty(m, lines, errors) * errors.rig.of(m);
+    const Eigen::Vector2d by_print = m.group < errors_of_boundary.size() ? print_row(m) : Eigen::Vector2d::Zero();
+    for (int i = 0; i < RigErrors::most; ++i) {
+      SharedPull& pull = pulls[static_cast<std::size_t>(i)];
+      pull.x += shifts[i] * m.row;
+      pull.by_group[m.group] += shifts[i];
+      if (m.group >= errors_of_boundary.size()) continue;
+      const auto& edges = errors_of_boundary[m.group];
+      for (std::size_t edge = 0; edge < 2; ++edge)
+        pull.n[edges[edge]] += shifts[i] * by_print[static_cast<Eigen::Index>(edge)];
+    }
   }
-  sums.equations.add(UnknownVector::Unit(Unknowns, Unknowns - 1), PrintVector::Zero(), 1, film_prior);
-  if (errors.whole_px > 0 || errors.leaning_px > 0 || errors.bowed_px > 0)
-    add_pulls_of_all(measurements, lines, errors, sums);
-  return sums;
+  for (SharedPull& pull : pulls) {
+    pull.error_px = 1;
+    sums.shared.push_back(pull);
+  }
 }
 
 }  // namespace
 
-PrintSums print_sums(std::span<const Measurement> measurements, const ResidualLines& lines, int pose_unknowns,
-                     double film_prior, const CommonErrors& errors) {
-  return pose_unknowns == 4 ? print_sums_of<5>(measurements, lines, film_prior, errors)
-                            : print_sums_of<7>(measurements, lines, film_prior, errors);
+PrintSums print_sums(std::span<const Measurement> measurements, const ResidualLines& lines, double film_prior,
+                     const CommonErrors& errors) {
+  std::array<Products, measurement_groups> products;
+  for (const Measurement& m : measurements) products[m.group].add(m, robust_certainty(m, lines, errors));
+  PrintSums sums;
+  for (std::size_t group = 0; group < measurement_groups; ++group) {
+    sums.pulls[group] = gathered(products[group], group, sums.equations);
+    sums.pulls[group].error_px = errors.px[group];
+  }
+  sums.equations.add(UnknownVector::Unit(film_unknown), PrintVector::Zero(), 1, film_prior);
+  if (errors.whole_px > 0 || errors.leaning_px > 0 || errors.bowed_px > 0)
+    add_pulls_of_all(measurements, lines, errors, sums);
+  if (errors.rig.any()) add_pulls_of_camera(measurements, lines, errors, sums);
+  return sums;
 }
+
+PrintSums held(PrintSums sums, const RcmMeasurement& rcm) {
+  sums.equations.xx += rcm.rows.transpose() * rcm.rows;
+  sums.equations.x += rcm.rows.transpose() * rcm.residual;
+  return sums;
+}
+
+namespace {
+
+double certainty_of(const GroupPull& group) {
+  return 1 / (group.weight + 1 / (group.error_px * group.error_px));
+}
+
+// How one sigma of an error that groups share pulls the print's errors, whatever pose, film and groups' errors are.
+PrintVector print_pull_of(const SharedPull& pull, const PrintSums& sums, const PrintCrossMatrix& through) {
+  UnknownVector x = pull.x;
+  PrintVector n = pull.n;
+  for (std::size_t group = 0; group < measurement_groups; ++group) {
+    const GroupPull& of_group = sums.pulls[group];
+    if (!(of_group.weight > 0) || pull.by_group[group] == 0) continue;
+    const double part = certainty_of(of_group) * pull.by_group[group];
+    x -= part * of_group.x, n -= part * of_group.n;
+  }
+  return n - through * x;
+}
+
+// What is left of the information where an error that pulls so may be in it, as doubted() has it.
+PrintInformation beside(PrintInformation print, const PrintVector& moved) {
+  constexpr double ridge = 1e-9;
+  PrintMatrix solvable = print.information;
+  solvable.diagonal().array() += ridge * print.information.trace();
+  const PrintVector shape = solvable.ldlt().solve(moved);
+  const double certainty = 1 / (1 + shape.dot(moved));
+  print.gradient -= certainty * shape.dot(print.gradient) * moved;
+  print.information -= certainty * moved * moved.transpose();
+  return print;
+}
+
+}  // namespace
 
 std::optional<PrintInformation> information_of(const PrintSums& sums) {
   PrintEquations e = sums.equations;
   for (const GroupPull& pull : sums.pulls)
-    if (pull.weight > 0) e.add(pull.x, pull.n, -1 / (pull.weight + 1 / (pull.error_px * pull.error_px)), pull.residual);
+    if (pull.weight > 0) e.add(pull.x, pull.n, -certainty_of(pull), pull.residual);
   const auto inverse = inverse_of(e.xx);
   if (!inverse) return std::nullopt;
   const PrintCrossMatrix through = e.nx.lazyProduct(*inverse);
-  return PrintInformation{e.nn - through.lazyProduct(e.nx.transpose()), e.n - through.lazyProduct(e.x)};
+  PrintInformation print{e.nn - through.lazyProduct(e.nx.transpose()), e.n - through.lazyProduct(e.x)};
+  for (const SharedPull& pull : sums.shared)
+    if (const PrintVector moved = print_pull_of(pull, sums, through); moved.squaredNorm() > 0)
+      print = beside(print, moved);
+  return print;
 }
 
 std::optional<PrintSolution> solved_with_print(const PrintSums& sums, const PrintPrior& prior) {
@@ -155,6 +210,7 @@ std::optional<PrintSolution> solved_with_print(const PrintSums& sums, const Prin
   if (!inverted) return std::nullopt;
   const UnknownMatrix& inverse = *inverted;
   PrintSolution solution;
+  solution.inverse = inverse;
   solution.step = inverse * (e.x - by_x.transpose() * e.n);
   solution.print_mm = print_covariance * (e.n - e.nx * solution.step);
   solution.covariance = inverse;
@@ -163,7 +219,7 @@ std::optional<PrintSolution> solved_with_print(const PrintSums& sums, const Prin
     solution.covariance.noalias() += error * error.transpose();
   };
   for (const GroupPull& pull : sums.pulls) widen(pull);
-  for (const GroupPull& pull : sums.of_all_boundaries) widen(pull);
+  for (const GroupPull& pull : sums.shared) widen(pull);
   const bool finite = solution.covariance.allFinite() && solution.step.allFinite() && solution.print_mm.allFinite();
   return finite && (solution.covariance.diagonal().array() > 0).all() ? std::optional(solution) : std::nullopt;
 }

@@ -9,7 +9,7 @@
 #include "lapservo/vision/model/common_errors.h"
 #include "lapservo/vision/model/print_evidence.h"
 #include "lapservo/vision/model/residual_lines.h"
-#include "lapservo/vision/shaft/shaft_pose.h"
+#include "lapservo/vision/shaft/rcm_prior.h"
 
 namespace lapservo::internal {
 
@@ -21,20 +21,15 @@ inline Eigen::Vector2d print_row(const Measurement& m) {
   return {along * (1 - m.turn_fraction), along * m.turn_fraction};
 }
 
-using PrintCrossMatrix = Eigen::Matrix<double, print_errors, Eigen::Dynamic, 0, print_errors, max_unknowns>;
+using PrintCrossMatrix = Eigen::Matrix<double, print_errors, fit_unknowns>;
 
 /// Normal equations of the pose and film (x) and of the print's errors (n).
 struct PrintEquations {
-  UnknownMatrix xx;
-  PrintCrossMatrix nx;
+  UnknownMatrix xx = UnknownMatrix::Zero();
+  PrintCrossMatrix nx = PrintCrossMatrix::Zero();
   PrintMatrix nn = PrintMatrix::Zero();
-  UnknownVector x;
+  UnknownVector x = UnknownVector::Zero();
   PrintVector n = PrintVector::Zero();
-
-  explicit PrintEquations(int unknowns)
-      : xx(UnknownMatrix::Zero(unknowns, unknowns)),
-        nx(PrintCrossMatrix::Zero(print_errors, unknowns)),
-        x(UnknownVector::Zero(unknowns)) {}
 
   /// Adds weight * row * row^T, and of the residual.
   void add(const UnknownVector& row_x, const PrintVector& row_n, double weight, double residual) {
@@ -50,21 +45,29 @@ struct PrintEquations {
 
 /// What a group of measurements says together: sums of weighted rows and residuals.
 struct GroupPull {
-  UnknownVector x;
+  UnknownVector x = UnknownVector::Zero();
   PrintVector n = PrintVector::Zero();
   double weight = 0, residual = 0, error_px = 0;
 };
 
-/// Of all measurements; what each group says, and what all boundaries together do.
+/// An error that measurements of several groups share.
+struct SharedPull : GroupPull {
+  std::array<double, measurement_groups> by_group{};  ///< sums of weights times what one sigma of it moves; or zeros
+};
+
+/// Of all measurements; what each group says, and what errors do that measurements of several groups share.
 struct PrintSums {
   PrintEquations equations;
   std::array<GroupPull, measurement_groups> pulls;
-  InplaceVector<GroupPull, 3> of_all_boundaries;
+  InplaceVector<SharedPull, 3 + RigErrors::most> shared;
 };
 
 /// Weighted robustly about `lines`. `film_prior` as the fit has it.
-PrintSums print_sums(std::span<const Measurement> measurements, const ResidualLines& lines, int pose_unknowns,
-                     double film_prior, const CommonErrors& errors);
+PrintSums print_sums(std::span<const Measurement> measurements, const ResidualLines& lines, double film_prior,
+                     const CommonErrors& errors);
+
+/// The same of a shaft that is held at the RCM.
+PrintSums held(PrintSums sums, const RcmMeasurement& rcm);
 
 /// What the residuals say about the print's errors, whatever the pose, the film and the common errors are. Nullopt when
 /// they say nothing.
@@ -79,9 +82,10 @@ inline double print_shift_px(const Measurement& m, const PrintVector& print_mm) 
 
 /// Of pose and film, and of the print's errors.
 struct PrintSolution {
-  UnknownVector step;
+  UnknownVector step = UnknownVector::Zero();
   PrintVector print_mm = PrintVector::Zero();
-  UnknownMatrix covariance;
+  UnknownMatrix inverse = UnknownMatrix::Zero();  ///< of the equations of pose and film
+  UnknownMatrix covariance = UnknownMatrix::Zero();
 };
 
 /// The likeliest pose when the print's errors are so, and how sure it is. Nullopt when a direction is not seen at all.

@@ -30,10 +30,13 @@ struct Hypothesis {
 constexpr std::size_t hypotheses = (1 + limits.bands.size()) * (1 + limits.inks.size());
 using Hypotheses = InplaceVector<Hypothesis, hypotheses>;
 
-// The first is the rig's print. Every print's bands are off by the tolerance.
-Hypotheses prior_hypotheses(double tolerance_mm, bool is_known) {
+// The first is the rig's print. Every print's bands are off by what the rig says of them.
+Hypotheses prior_hypotheses(const Marker& marker, bool is_known) {
+  const double tolerance_mm = marker.boundary_sigma_m() / mm_in_m;
+  const bool is_measured = marker.measured_sigma_m().has_value();
   const auto fraction_of = [&](const ErrorSize& size) {
-    return is_known && size.mm >= limits.off_mm ? limits.fraction_of_known : size.fraction;
+    const bool seldom = (is_known && size.mm >= limits.off_mm) || (is_measured && size.mm > tolerance_mm);
+    return seldom ? limits.fraction_of_known : size.fraction;
   };
   const auto right = [&](const auto& sizes) {
     double fraction = 1;
@@ -69,24 +72,21 @@ Hypotheses weighted(Hypotheses all, const PrintInformation& evidence) {
 // Weighted solutions as one.
 class Mixture {
  public:
-  explicit Mixture(int unknowns)
-      : step_(UnknownVector::Zero(unknowns)), squares_(UnknownMatrix::Zero(unknowns, unknowns)), psi_(unknowns - 2) {}
   void add(const PrintSolution& solution, double weight) {
     step_ += weight * solution.step;
     print_mm_ += weight * solution.print_mm;
     squares_ += weight * (solution.covariance + solution.step * solution.step.transpose());
     weight_ += weight;
-    parts_.push_back({weight, solution.step[psi_], solution.covariance(psi_, psi_)});
+    parts_.push_back({weight, solution.step[psi_unknown], solution.covariance(psi_unknown, psi_unknown)});
   }
-  PrintSolution mean() const {
-    const UnknownVector step = step_ / weight_;
-    return {step, print_mm_ / weight_, squares_ / weight_ - step * step.transpose()};
-  }
+  UnknownVector step() const { return step_ / weight_; }
+  PrintVector print_mm() const { return print_mm_ / weight_; }
+  UnknownMatrix covariance() const { return squares_ / weight_ - step() * step().transpose(); }
   // That the mean of psi is wrong.
   double p_false() const {
     double sum = 0;
     for (const Part& part : parts_)
-      sum += part.weight * p_false_of(part.psi_rad - step_[psi_] / weight_, part.psi_variance_rad2);
+      sum += part.weight * p_false_of(part.psi_rad - step_[psi_unknown] / weight_, part.psi_variance_rad2);
     return sum / weight_;
   }
 
@@ -94,24 +94,35 @@ class Mixture {
   struct Part {
     double weight, psi_rad, psi_variance_rad2;
   };
-  UnknownVector step_;
+  UnknownVector step_ = UnknownVector::Zero();
   PrintVector print_mm_ = PrintVector::Zero();
-  UnknownMatrix squares_;
-  Eigen::Index psi_;
+  UnknownMatrix squares_ = UnknownMatrix::Zero();
   double weight_ = 0;
   InplaceVector<Part, hypotheses> parts_;
 };
 
-std::optional<Mixture> mixed(const PrintSums& sums, const PrintSolution& as_the_rig_says, const Hypotheses& all) {
-  Mixture mixture(static_cast<int>(as_the_rig_says.step.size()));
-  mixture.add(as_the_rig_says, all[0].weight);
-  for (std::size_t i = 1; i < all.size(); ++i) {
-    if (all[i].weight < limits.min_weight) continue;
-    const auto off = solved_with_print(sums, all[i].prior);
+// What the frame says of pose and print: each size of errors with its weight, and the mean over them.
+struct Judgement {
+  Hypotheses all;
+  PrintSolution as_the_rig_says;
+  Mixture mixture;
+};
+
+std::optional<Judgement> judged(const PrintSums& sums, const Hypotheses& prior, const PrintDoubt& doubt,
+                                const Marker& marker) {
+  const auto as_the_rig_says = solved_with_print(sums, prior[0].prior);
+  if (!as_the_rig_says) return std::nullopt;
+  // Nothing, where the frame tells nothing of the print.
+  const PrintInformation print = information_of(sums).value_or(PrintInformation{});
+  Judgement out{weighted(prior, doubted(print, doubted_shapes_mm(doubt, sums, marker))), *as_the_rig_says, {}};
+  out.mixture.add(*as_the_rig_says, out.all[0].weight);
+  for (std::size_t i = 1; i < out.all.size(); ++i) {
+    if (out.all[i].weight < limits.min_weight) continue;
+    const auto off = solved_with_print(sums, out.all[i].prior);
     if (!off) return std::nullopt;
-    mixture.add(*off, all[i].weight);
+    out.mixture.add(*off, out.all[i].weight);
   }
-  return mixture;
+  return out;
 }
 
 double off_probability(const Hypotheses& all) {
@@ -121,6 +132,13 @@ double off_probability(const Hypotheses& all) {
   return sum;
 }
 
+// By how many sigmas of both the shaft at `step` misses the RCM.
+double missed_sigmas(const UnknownVector& step, const UnknownMatrix& covariance, const RcmMeasurement& rcm) {
+  const Eigen::Vector2d missed = rcm.residual - rcm.rows * step;
+  const Eigen::Matrix2d of_both = Eigen::Matrix2d::Identity() + rcm.rows * covariance * rcm.rows.transpose();
+  return std::sqrt(std::max(0.0, missed.dot(of_both.inverse() * missed)));
+}
+
 }  // namespace
 
 double p_false_of(double mean_rad, double variance_rad2) {
@@ -128,34 +146,36 @@ double p_false_of(double mean_rad, double variance_rad2) {
   return 0.5 * (std::erfc((limit_rad - mean_rad) * scale) + std::erfc((limit_rad + mean_rad) * scale));
 }
 
-std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const ResidualLines& lines, int pose_unknowns,
-                                  double film_prior, const Marker& marker, bool is_known, const CommonErrors& errors) {
-  const PrintSums sums = print_sums(measurements, lines, pose_unknowns, film_prior, errors);
-  const double tolerance_mm = marker.tolerance_m / mm_in_m;
-  const auto as_the_rig_says = solved_with_print(sums, {tolerance_mm});
-  const auto exact = tolerance_mm > 0 ? solved_with_print(sums, {}) : as_the_rig_says;
-  if (!exact || !as_the_rig_says) return std::nullopt;
-  // Nothing, where the frame tells nothing of the print.
-  const PrintInformation print = information_of(sums).value_or(PrintInformation{});
-  const PrintInformation evidence = doubted(print, doubted_shapes_mm(errors.doubt, sums, marker));
-  const Hypotheses all = weighted(prior_hypotheses(tolerance_mm, is_known || marker.bands_are_measured()), evidence);
-  const auto mixture = mixed(sums, *as_the_rig_says, all);
-  if (!mixture) return std::nullopt;
-  PrintSolution mean = mixture->mean();
-  mean.step -= exact->step;  // whose pose is where the measurements were taken
-  for (Measurement& m : measurements) m.residual_px -= m.row.dot(mean.step) + print_shift_px(m, mean.print_mm);
-  const auto psi_variance = [psi = pose_unknowns - 1](const PrintSolution& solution) {
-    return solution.covariance(psi, psi);
-  };
-  const double tolerated_rad2 = psi_variance(*as_the_rig_says);
+std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const ResidualLines& lines,
+                                  const std::optional<RcmMeasurement>& rcm, bool through_rcm, double film_prior,
+                                  const Marker& marker, bool is_known, const CommonErrors& errors) {
+  const PrintSums by_image = print_sums(measurements, lines, film_prior, errors);
+  const PrintSums sums = rcm && through_rcm ? held(by_image, *rcm) : by_image;
+  const Hypotheses prior = prior_hypotheses(marker, is_known);
+  const auto print = judged(sums, prior, errors.doubt, marker);
+  if (!print) return std::nullopt;
+  const auto exact = prior[0].prior.bands_mm > 0 ? solved_with_print(sums, {}) : print->as_the_rig_says;
+  if (!exact) return std::nullopt;
   PrintFit fit;
-  fit.step = mean.step;
-  fit.step_as_the_rig_says = as_the_rig_says->step - exact->step;
-  fit.covariance = mean.covariance.topLeftCorner(pose_unknowns, pose_unknowns);
-  fit.off_probability = off_probability(all);
-  fit.p_false = mixture->p_false();
-  fit.p_false_by_tolerance = p_false_of(0, tolerated_rad2);
-  fit.psi_variance_by_tolerance = tolerated_rad2 - psi_variance(*exact);
+  fit.step = print->mixture.step() - exact->step;  // whose pose is where the measurements were taken
+  fit.step_as_the_rig_says = print->as_the_rig_says.step - exact->step;
+  for (Measurement& m : measurements)
+    m.residual_px -= m.row.dot(fit.step) + print_shift_px(m, print->mixture.print_mm());
+  fit.covariance = print->mixture.covariance().topLeftCorner<pose_unknowns, pose_unknowns>();
+  const auto psi_variance = [](const PrintSolution& s) { return s.covariance(psi_unknown, psi_unknown); };
+  fit.off_probability = off_probability(print->all);
+  fit.p_false = print->mixture.p_false();
+  fit.p_false_by_tolerance = p_false_of(0, psi_variance(print->as_the_rig_says)) - p_false_of(0, psi_variance(*exact));
+  fit.psi_variance_by_tolerance = psi_variance(print->as_the_rig_says) - psi_variance(*exact);
+  if (!rcm) return fit;
+  if (through_rcm)
+    fit.by_rcm_m = (print->as_the_rig_says.inverse * rcm->rows.transpose() * rcm->by_rcm_m).topRows<pose_unknowns>();
+  // Most frames show the rig's print, and of that pass the RCM.
+  const auto free = solved_with_print(by_image, prior[0].prior);
+  if (free) fit.rcm_missed_sigmas = missed_sigmas(free->step, free->covariance, *rcm);
+  if (!(fit.rcm_missed_sigmas > limits.clearly_missed_sigmas)) return fit;
+  if (const auto whole = through_rcm ? judged(by_image, prior, errors.doubt, marker) : print)
+    fit.rcm_missed_sigmas = missed_sigmas(whole->mixture.step(), whole->mixture.covariance(), *rcm);
   return fit;
 }
 

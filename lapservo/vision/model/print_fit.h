@@ -8,7 +8,7 @@
 #include "lapservo/vision/edges/edge_measurements.h"
 #include "lapservo/vision/model/common_errors.h"
 #include "lapservo/vision/model/residual_lines.h"
-#include "lapservo/vision/shaft/shaft_pose.h"
+#include "lapservo/vision/shaft/rcm_prior.h"
 
 namespace lapservo::internal {
 
@@ -24,10 +24,11 @@ struct PrintLimits {
   std::array<ErrorSize, 7> bands{
       {{0.01, 0.08}, {0.02, 0.04}, {0.04, 0.02}, {0.08, 0.01}, {0.16, 0.005}, {0.32, 0.0025}, {0.64, 0.00125}}};
   std::array<ErrorSize, 5> inks{{{0.04, 0.02}, {0.08, 0.01}, {0.16, 0.005}, {0.32, 0.0025}, {0.64, 0.00125}}};
-  /// Each size from off_mm on, of prints whose bands were measured, or that were seen to be the rig's.
+  /// Each size from off_mm on of prints that were seen to be the rig's, and each beyond a measured print's sigma.
   double fraction_of_known = 1e-4;
-  double off_mm = 0.04;      ///< a print is off by this and more
-  double min_weight = 1e-6;  ///< of a size that counts
+  double off_mm = 0.04;              ///< a print is off by this and more
+  double min_weight = 1e-6;          ///< of a size that counts
+  double clearly_missed_sigmas = 3;  ///< of the RCM, from which on prints that are off are asked, too
 };
 inline constexpr PrintLimits print_limits;
 
@@ -37,12 +38,16 @@ double p_false_of(double mean_rad, double variance_rad2);
 /// A pose, given that the print may lie elsewhere than the rig says: each boundary at either edge of the print (tau = 0
 /// and tau -> 2 pi, linear between; the ends are circles).
 struct PrintFit {
-  UnknownVector step;                    ///< to the mean of pose and film, from where the measurements were taken
-  UnknownVector step_as_the_rig_says;    ///< the same, of the rig's print
-  UnknownMatrix covariance;              ///< of the pose's unknowns
+  UnknownVector step;                  ///< to the mean of pose and film, from where the measurements were taken
+  UnknownVector step_as_the_rig_says;  ///< the same, of the rig's print
+  PoseMatrix covariance;               ///< of the pose's unknowns
+  /// d(the pose's unknowns)/d(RCM in the camera frame) [1/m].
+  Eigen::Matrix<double, pose_unknowns, 3> by_rcm_m = Eigen::Matrix<double, pose_unknowns, 3>::Zero();
+  /// By how many sigmas the shaft that the image alone shows misses the RCM, whatever the print is.
+  double rcm_missed_sigmas = 0;
   double off_probability = 0;            ///< that the print is off by print_limits.off_mm and more
   double p_false = 1;                    ///< that psi is wrong
-  double p_false_by_tolerance = 0;       ///< the same of a print that is off by no more than the rig's tolerance
+  double p_false_by_tolerance = 0;       ///< what the rig's tolerance adds to it
   double psi_variance_by_tolerance = 0;  ///< what the rig's tolerance adds to an exact print's
 };
 
@@ -50,8 +55,10 @@ struct PrintFit {
 /// pose is a mean over the rig's print and prints that are off (PrintLimits), each weighted by how likely it makes the
 /// residuals. On return the residuals are those that the step and the print's likeliest errors leave.
 /// `lines` are those of these residuals, `film_prior` as the fit has it, `is_known`: earlier frames showed that the
-/// print is the rig's. Nullopt when a direction is not seen at all.
-std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const ResidualLines& lines, int pose_unknowns,
-                                  double film_prior, const Marker& marker, bool is_known, const CommonErrors& errors);
+/// print is the rig's. `rcm` may be absent; `through_rcm`: the shaft is held at it. Nullopt when a direction is not
+/// seen at all.
+std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const ResidualLines& lines,
+                                  const std::optional<RcmMeasurement>& rcm, bool through_rcm, double film_prior,
+                                  const Marker& marker, bool is_known, const CommonErrors& errors);
 
 }  // namespace lapservo::internal

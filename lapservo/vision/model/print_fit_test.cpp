@@ -21,7 +21,7 @@ using scenes::Shot;
 using scenes::Sight;
 
 constexpr std::uint64_t shots = 6;
-constexpr int psi = 3;
+constexpr int psi = psi_unknown;
 
 Shot shot_of(const Marker& print, std::uint64_t seed) {
   Rig printed = scenes::usual_rig();
@@ -35,7 +35,7 @@ PrintFit fit_of(const Shot& shot, const Marker& believed, std::optional<std::siz
   Rig rig = shot.rig;
   rig.instruments[0].marker = believed;
   const Sight sight(rig, shot.bgr);
-  const PoseUnknowns truth = PoseUnknowns::rcm(*rig.instruments[0].camera_from_rcm, shot.q);
+  const PoseUnknowns truth = shot.truth(true);
   const EdgeBlur lens;
   EdgeMeasurements edges = measure_edges(sight.scene(), sight.light(), truth, film_mean_m, {2, 0, 1, 1}, lens);
   if (hidden) {
@@ -47,7 +47,9 @@ PrintFit fit_of(const Shot& shot, const Marker& believed, std::optional<std::siz
   }
   const ResidualLines lines = residual_lines(edges.all);
   const CommonErrors errors = common_errors(edges, lines, lens, std::nullopt, {}, {});
-  return fit_print(edges.all, lines, truth.size(), 0, believed, is_known, errors).value();
+  return fit_print(edges.all, lines, sight.scene().registration->of(truth.pose(), 1e-7), true, 0, believed, is_known,
+                   errors)
+      .value();
 }
 
 Marker measured(Marker marker, double sigma_m) {
@@ -77,7 +79,8 @@ TEST(PrintFit, AnInkAsideIsSeenAndPsiIsRightAllTheSame) {
       const Sight sight(scenes::usual_rig(), shot.bgr);
       const FineFit fit = fit_finely(sight.scene(), sight.light(), shot.truth(true), {});
       EXPECT_GT(fit.off_probability, 0.8);
-      EXPECT_LT(std::abs(wrap_pi(fit.unknowns.q()->psi_rad - shot.q.psi_rad)), 4 * std::sqrt(fit.psi_variance_rad2()));
+      EXPECT_LT(std::abs(wrap_pi(scenes::q_of(shot.rig, fit.unknowns).psi_rad - shot.q.psi_rad)),
+                4 * std::sqrt(fit.psi_variance_rad2()));
     }
 }
 

@@ -23,7 +23,7 @@ struct Steepness {
   explicit Steepness(const EdgeMeasurements& pass) {
     for (const Measurement& m : pass.all) {
       if (m.group >= points.size()) continue;
-      const double steepness = m.row[m.row.size() - 2];  // psi is the last unknown before the film
+      const double steepness = m.row[psi_unknown];
       squares[static_cast<Eigen::Index>(m.group)] += steepness * steepness, ++points[m.group];
     }
     for (std::size_t k = 0; k < points.size(); ++k) squares[static_cast<Eigen::Index>(k)] /= std::max(1, points[k]);

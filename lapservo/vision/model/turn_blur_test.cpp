@@ -29,8 +29,8 @@ EdgeMeasurements boundaries_blurred_by(const std::array<double, 4>& beyond_px2,
     if (std::find(hidden.begin(), hidden.end(), k) != hidden.end()) continue;
     for (int i = 0; i < 20; ++i) {
       Measurement m;
-      m.row = UnknownVector::Zero(5);
-      m.row[3] = steepness[k];
+      m.row = UnknownVector::Zero();
+      m.row[psi_unknown] = steepness[k];
       m.group = k;
       pass.all.push_back(m);
     }

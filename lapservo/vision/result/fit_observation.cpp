@@ -19,17 +19,13 @@ struct LineSigma {
 
 // To first order, by differences: gamma moves with the pose, psi is its last unknown.
 LineSigma sigma_of(const CentreLine& line, const Scene& scene, const FineFit& fit) {
-  const int n = fit.unknowns.size();
-  UnknownVector tau = UnknownVector::Zero(n);
-  Eigen::Matrix<double, 8, Eigen::Dynamic, 0, 8, max_unknowns> edges;
-  edges.setZero(8, n);
+  PoseVector tau = PoseVector::Zero();
+  Eigen::Matrix<double, 8, pose_unknowns> edges = Eigen::Matrix<double, 8, pose_unknowns>::Zero();
   const auto after = [&](int unknown, double step) {
-    UnknownVector change = UnknownVector::Zero(n);
-    change[unknown] = step;
-    const ShaftPose pose = fit.unknowns.changed_by(change).pose();
+    const ShaftPose pose = fit.unknowns.changed_by(step * PoseVector::Unit(unknown)).pose();
     return centre_line(scene.camera, scene.marker, pose.camera_from_unrolled, pose.psi_rad);
   };
-  for (int i = 0; i < n; ++i) {
+  for (int i = 0; i < pose_unknowns; ++i) {
     double step = 1e-6;
     auto moved = after(i, step);
     // Over the seam the inner boundaries jump.
@@ -41,33 +37,40 @@ LineSigma sigma_of(const CentreLine& line, const Scene& scene, const FineFit& fi
   }
   LineSigma sigma;
   sigma.tau_rad = std::sqrt(tau.dot(fit.covariance * tau));
-  const Eigen::Matrix<double, 8, Eigen::Dynamic, 0, 8, max_unknowns> weighted = edges.lazyProduct(fit.covariance);
-  sigma.edges_px2 = weighted.lazyProduct(edges.transpose());
+  sigma.edges_px2 = edges * fit.covariance * edges.transpose();
   return sigma;
 }
 
-// q of a freely fitted shaft that misses the RCM: the shaft from the RCM to the marker's proximal end. The angle
-// between it and the fitted axis is how wrong each angle may be; where that is too much, q is unknown.
-std::optional<Observation::Rcm> configuration_despite_mismatch(const FineFit& fit, const Rigid3& camera_from_rcm) {
-  constexpr double max_mismatch_rad = 0.03;
-  const Rigid3& fitted = fit.unknowns.pose().camera_from_unrolled;
-  const auto q = configuration_of(fit.unknowns.pose(), camera_from_rcm);
-  if (!q) return std::nullopt;
-  const Rigid3 through_rcm = camera_from_rcm * rcm_from_unrolled(*q);
-  const Eigen::Vector3d z = Eigen::Vector3d::UnitZ();
-  const double mismatch_rad = std::atan2((fitted.rotation * z).cross(through_rcm.rotation * z).norm(),
-                                         (fitted.rotation * z).dot(through_rcm.rotation * z));
-  if (!(mismatch_rad < max_mismatch_rad)) return std::nullopt;
-  const double angle_variance =
-      mismatch_rad * mismatch_rad + fit.covariance(fit.unknowns.size() - 1, fit.unknowns.size() - 1);
-  const double rho_variance = mismatch_rad * mismatch_rad * q->rho_m * q->rho_m + fit.covariance(4, 4);
-  const Eigen::Vector4d variances(angle_variance, angle_variance, rho_variance, angle_variance);
-  return Observation::Rcm{*q, variances.asDiagonal()};
+// A registration that the shaft misses, known only to the distance and the angle by which it does. Nullopt where that
+// is too much to be of use.
+std::optional<RcmPrior> doubted(const RcmPrior& registration, const ShaftPose& pose) {
+  constexpr double most_rad = 0.03;
+  const Eigen::Vector3d to_rcm = registration.camera_from_rcm.translation - pose.camera_from_unrolled.translation;
+  const Eigen::Vector3d axis = pose.camera_from_unrolled.rotation * Eigen::Vector3d::UnitZ();
+  const double missed_m = to_rcm.cross(axis).norm(), missed_rad = std::atan2(missed_m, -to_rcm.dot(axis));
+  if (!(missed_rad < most_rad)) return std::nullopt;
+  RcmPrior wide = registration;
+  wide.covariance.diagonal().array() += (Eigen::Array<double, 6, 1>() << Eigen::Array3d::Constant(missed_m * missed_m),
+                                         Eigen::Array3d::Constant(missed_rad * missed_rad))
+                                            .finished();
+  return wide;
+}
+
+std::optional<Observation::Rcm> rcm_of(const FineFit& fit, const RcmPrior* registration) {
+  if (!registration) return std::nullopt;
+  const auto known =
+      fit.unknowns.through_rcm() ? std::optional(*registration) : doubted(*registration, fit.unknowns.pose());
+  if (!known) return std::nullopt;
+  const auto estimate = configuration_estimate(fit.unknowns, fit.covariance, *known, fit.with_registration);
+  if (!estimate) return std::nullopt;
+  Observation::Rcm rcm{estimate->q, estimate->covariance};
+  rcm.q.theta_rad = wrap_pi(rcm.q.theta_rad), rcm.q.psi_rad = wrap_pi(rcm.q.psi_rad);
+  return rcm;
 }
 
 }  // namespace
 
-Observation observation_of(const Scene& scene, const FineFit& fit, const std::optional<Rigid3>& camera_from_rcm) {
+Observation observation_of(const Scene& scene, const FineFit& fit) {
   Observation observation;
   const ShaftPose& pose = fit.unknowns.pose();
   const auto line = centre_line(scene.camera, scene.marker, pose.camera_from_unrolled, pose.psi_rad);
@@ -82,21 +85,15 @@ Observation observation_of(const Scene& scene, const FineFit& fit, const std::op
   observation.edges_ideal_px = line->ideal_px;
   observation.edges_covariance_px2 = sigma.edges_px2;
   for (std::size_t k = 0; k < 4; ++k) observation.edges_raw_px[k] = scene.camera.raw_from_ideal(line->ideal_px[k]);
-  observation.features =
-      features_of(line->ideal_px, camera_from_rcm ? projected_rcm_px(scene.camera, *camera_from_rcm) : std::nullopt);
-  observation.camera_from_unrolled = pose.camera_from_unrolled;
-  observation.psi_rad = pose.psi_rad;
-  observation.p_false = std::max(fit.p_false, p_false_of(0, fit.psi_variance_rad2()));
+  const RcmPrior* registration = scene.registration;
+  observation.features = features_of(
+      line->ideal_px, registration ? projected_rcm_px(scene.camera, registration->camera_from_rcm) : std::nullopt);
+  observation.p_false = fit.p_false;
   observation.marker = marker_pose_of(scene.marker, fit.unknowns, fit.covariance);
-  if (fit.unknowns.q()) {
-    observation.rcm = Observation::Rcm{*fit.unknowns.q(), fit.covariance};
-  } else if (camera_from_rcm) {
-    observation.rcm = configuration_despite_mismatch(fit, *camera_from_rcm);
-  }
-  if (observation.rcm) {
-    observation.rcm->q.theta_rad = wrap_pi(observation.rcm->q.theta_rad);
-    observation.rcm->q.psi_rad = wrap_pi(observation.rcm->q.psi_rad);
-  }
+  observation.rcm = rcm_of(fit, registration);
+  const ShaftPose told = observation.rcm ? in_azimuths_of(pose, observation.rcm->q.psi_rad) : pose;
+  observation.camera_from_unrolled = told.camera_from_unrolled;
+  observation.psi_rad = told.psi_rad;
   return observation;
 }
 

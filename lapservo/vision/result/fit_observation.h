@@ -1,8 +1,5 @@
 #pragma once
 
-#include <optional>
-
-#include "lapservo/geometry/rigid3.h"
 #include "lapservo/vision/model/fine_fit.h"
 #include "lapservo/vision/observation.h"
 #include "lapservo/vision/shaft/scene.h"
@@ -10,7 +7,7 @@
 namespace lapservo::internal {
 
 /// A fit that was accepted, as the user sees it: Status::ok, or Status::poor_fit where the pose shows no centre line.
-Observation observation_of(const Scene& scene, const FineFit& fit, const std::optional<Rigid3>& camera_from_rcm);
+Observation observation_of(const Scene& scene, const FineFit& fit);
 
 /// Of this status, with the pose that was refused.
 Observation refused_observation(Status why, const ShaftPose& pose);

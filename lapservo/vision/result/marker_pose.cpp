@@ -5,7 +5,7 @@
 namespace lapservo::internal {
 
 Observation::MarkerPose marker_pose_of(const Marker& marker, const PoseUnknowns& unknowns,
-                                       const UnknownMatrix& covariance) {
+                                       const PoseMatrix& covariance) {
   const ShaftPose& pose = unknowns.pose();
   Observation::MarkerPose result;
   result.camera_from_marker = camera_from_marker(marker, pose.camera_from_unrolled, pose.psi_rad);
@@ -13,14 +13,17 @@ Observation::MarkerPose marker_pose_of(const Marker& marker, const PoseUnknowns&
   if (rotation.w() < 0) rotation.coeffs() *= -1;  // one of the two that mean the same
   const Eigen::Vector3d& origin = result.camera_from_marker.translation;
   const Eigen::Matrix3d axes = result.camera_from_marker.rotation.toRotationMatrix();
-  const auto variance = [&covariance](const UnknownVector& row) { return row.dot(covariance * row); };
-  const auto of_origin = [&](const Eigen::Vector3d& direction) { return unknowns.row(origin, direction); };
-  // How the end of one of the marker's unit axes moves against its origin.
-  const auto of_axis = [&](int axis, const Eigen::Vector3d& direction) -> UnknownVector {
-    return unknowns.row(origin + axes.col(axis), direction) - of_origin(direction);
+  const auto variance = [&covariance](const PoseVector& row) { return row.dot(covariance * row); };
+  const auto of_point = [&](const Eigen::Vector3d& point, const Eigen::Vector3d& direction) -> PoseVector {
+    return unknowns.row(point, direction).head<pose_unknowns>();
   };
-  UnknownVector by_roll = of_axis(0, axes.col(1));
-  by_roll[unknowns.size() - 1] = 1;
+  const auto of_origin = [&](const Eigen::Vector3d& direction) { return of_point(origin, direction); };
+  // How the end of one of the marker's unit axes moves against its origin.
+  const auto of_axis = [&](int axis, const Eigen::Vector3d& direction) -> PoseVector {
+    return of_point(origin + axes.col(axis), direction) - of_origin(direction);
+  };
+  PoseVector by_roll = of_axis(0, axes.col(1));
+  by_roll[psi_unknown] = 1;
   result.sigma_xy_m =
       std::sqrt((variance(of_origin(Eigen::Vector3d::UnitX())) + variance(of_origin(Eigen::Vector3d::UnitY()))) / 2);
   result.sigma_z_m = std::sqrt(variance(of_origin(Eigen::Vector3d::UnitZ())));

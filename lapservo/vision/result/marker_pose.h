@@ -8,6 +8,6 @@ namespace lapservo::internal {
 
 /// The marker's pose where the unknowns have the shaft, and how sure it is by their covariance; to first order.
 Observation::MarkerPose marker_pose_of(const Marker& marker, const PoseUnknowns& unknowns,
-                                       const UnknownMatrix& covariance);
+                                       const PoseMatrix& covariance);
 
 }  // namespace lapservo::internal

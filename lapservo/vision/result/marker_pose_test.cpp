@@ -14,9 +14,9 @@ namespace {
 
 using scenes::usual_shot;
 
-UnknownMatrix random_covariance(int size, double sigma, Random& random) {
-  UnknownMatrix root = UnknownMatrix::Zero(size, size);
-  for (int i = 0; i < size; ++i)
+PoseMatrix random_covariance(double sigma, Random& random) {
+  PoseMatrix root = PoseMatrix::Zero();
+  for (int i = 0; i < pose_unknowns; ++i)
     for (int k = 0; k <= i; ++k) root(i, k) = sigma * random.normal();
   return root;
 }
@@ -29,13 +29,12 @@ Eigen::Vector3d column(const Rigid3& pose, int i) {
 void expect_sigmas_of(const Marker& marker, const PoseUnknowns& unknowns, Random& random) {
   constexpr int draws = 4000;
   constexpr double sigma = 1e-4;
-  const int size = unknowns.size();
-  const UnknownMatrix root = random_covariance(size, sigma, random);
+  const PoseMatrix root = random_covariance(sigma, random);
   const Observation::MarkerPose said = marker_pose_of(marker, unknowns, root * root.transpose());
   double xy = 0, z = 0, axis = 0, roll = 0;
   for (int draw = 0; draw < draws; ++draw) {
-    UnknownVector normal(size);
-    for (int i = 0; i < size; ++i) normal[i] = random.normal();
+    PoseVector normal;
+    for (double& number : normal) number = random.normal();
     const Rigid3 is = marker_pose_of(marker, unknowns.changed_by(root * normal), root).camera_from_marker;
     const Rigid3 error = said.camera_from_marker.inverse() * is;
     const Eigen::Vector3d moved = is.translation - said.camera_from_marker.translation;
@@ -54,21 +53,20 @@ TEST(MarkerPose, ErrorsAreAsItsSigmasSay) {
   const auto& shot = usual_shot(1);
   const Instrument& instrument = shot.rig.instruments[0];
   Random random(71);
-  const PoseUnknowns by_rcm = PoseUnknowns::rcm(*instrument.camera_from_rcm, shot.q);
-  expect_sigmas_of(instrument.marker, by_rcm, random);
-  expect_sigmas_of(instrument.marker, PoseUnknowns::free(by_rcm.pose()), random);
+  expect_sigmas_of(instrument.marker, shot.truth(true), random);
 }
 
 // Origin at the proximal end on the axis, z to the tip, x towards tau = 0, where the seam is.
 TEST(MarkerPose, IsTheConventionsFrame) {
   const auto& shot = usual_shot(1);
   const Instrument& instrument = shot.rig.instruments[0];
-  const UnknownMatrix nothing = UnknownMatrix::Zero(4, 4);
+  const PoseMatrix nothing = PoseMatrix::Zero();
   Marker marker = instrument.marker;
   const auto pose_at = [&](double psi_rad) {
     JointVector q = shot.q;
     q.psi_rad = psi_rad;
-    return marker_pose_of(marker, PoseUnknowns::rcm(*instrument.camera_from_rcm, q), nothing).camera_from_marker;
+    const PoseUnknowns unknowns(pose_through_rcm(*instrument.camera_from_rcm, q), true);
+    return marker_pose_of(marker, unknowns, nothing).camera_from_marker;
   };
   const Rigid3 camera_from_unrolled = *instrument.camera_from_rcm * rcm_from_unrolled(shot.q);
   marker.seam_rad = 0.7;
@@ -86,9 +84,7 @@ TEST(MarkerPose, IsSeenWithAndWithoutTheRcm) {
     const Observation seen = Tracker(rig).track(shot.bgr)[0];
     ASSERT_EQ(seen.status, Status::ok);
     ASSERT_TRUE(seen.marker);
-    const Rigid3 truth = marker_pose_of(instrument.marker, PoseUnknowns::rcm(*instrument.camera_from_rcm, shot.q),
-                                        UnknownMatrix::Zero(4, 4))
-                             .camera_from_marker;
+    const Rigid3 truth = marker_pose_of(instrument.marker, shot.truth(true), PoseMatrix::Zero()).camera_from_marker;
     const Rigid3 error = truth.inverse() * seen.marker->camera_from_marker;
     constexpr double sigmas = 4;
     EXPECT_LT(column(error, 2).head<2>().norm(), sigmas * seen.marker->sigma_axis_rad);

@@ -26,7 +26,7 @@ std::optional<PoseUnknowns> seen_at_depth(const PoseUnknowns& start, double scal
   const Eigen::Vector3d half = Eigen::Vector3d(0, 0, length_m / 2), middle = scale * (pose * half);
   const Eigen::Vector3d axis = (middle - camera_from_rcm.translation).normalized();
   const auto q = configuration_through(camera_from_rcm, middle - length_m / 2 * axis);
-  return q ? std::optional(PoseUnknowns::rcm(camera_from_rcm, *q)) : std::nullopt;
+  return q ? std::optional(PoseUnknowns(pose_through_rcm(camera_from_rcm, *q), true)) : std::nullopt;
 }
 
 }  // namespace
@@ -35,7 +35,7 @@ std::optional<PoseUnknowns> AgreementSearch::ImageTerms::unknowns(const Eigen::V
   const Eigen::Vector3d direction = (axis + at[0] * across + at[1] * away).normalized();
   const auto q = configuration_through(camera_from_rcm, camera_from_rcm.translation + at[2] * direction);
   if (!q) return std::nullopt;
-  return PoseUnknowns::rcm(camera_from_rcm, {q->theta_rad, q->phi_rad, q->rho_m, at[3]});
+  return PoseUnknowns(pose_through_rcm(camera_from_rcm, {q->theta_rad, q->phi_rad, q->rho_m, at[3]}), true);
 }
 
 AgreementSearch::ImageTerms AgreementSearch::ImageTerms::of(const Rigid3& camera_from_rcm, const PoseUnknowns& start) {

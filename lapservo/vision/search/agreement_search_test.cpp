@@ -26,13 +26,13 @@ struct BloodyShot {
   Sight sight;
 
   explicit BloodyShot(std::uint64_t seed) : BloodyShot(seed, Random(seed)) {}
-  PoseUnknowns truth() const { return PoseUnknowns::rcm(*rig.instruments[0].camera_from_rcm, q); }
+  PoseUnknowns truth() const { return {scenes::pose_of(rig, 0, q), true}; }
   double length_m() const { return rig.instruments[0].marker.length_m(); }
   // Of any rotation, at another depth along the line of sight.
   PoseUnknowns start(double depth_scale) const {
     const Rigid3& camera_from_rcm = *rig.instruments[0].camera_from_rcm;
     const Eigen::Vector3d place = depth_scale * truth().pose().camera_from_unrolled.translation;
-    return PoseUnknowns::rcm(camera_from_rcm, configuration_through(camera_from_rcm, place).value());
+    return {pose_through_rcm(camera_from_rcm, configuration_through(camera_from_rcm, place).value()), true};
   }
 
  private:
@@ -82,7 +82,8 @@ TEST(AgreementSearch, GoesOnFromWhereItsBudgetEnded) {
   EXPECT_GT(frames, 3);
   const auto spread = search.results();
   ASSERT_EQ(spread.size(), whole.size());
-  for (std::size_t i = 0; i < whole.size(); ++i) EXPECT_EQ(spread[i].q()->vector(), whole[i].q()->vector());
+  for (std::size_t i = 0; i < whole.size(); ++i)
+    EXPECT_EQ(scenes::q_of(shot.rig, spread[i]).vector(), scenes::q_of(shot.rig, whole[i]).vector());
 }
 
 // What the search climbs: the truth lies higher than what is beside it, however much blood there is.
@@ -97,7 +98,7 @@ TEST(ExplainedColours, AreMostAtTheTruth) {
     for (const double depth_scale : {0.7, 0.8, 1.2, 1.4}) lies_lower(shot.start(depth_scale).with_psi(shot.q.psi_rad));
     for (const double turn_rad : {-2.0, -1.0, 1.0, 2.0, pi})
       lies_lower(shot.truth().with_psi(shot.q.psi_rad + turn_rad));
-    for (const double rho_m : {-5e-3, 5e-3}) lies_lower(shot.truth().changed_by(Eigen::Vector4d(0, 0, rho_m, 0)));
+    for (const double rho_m : {-5e-3, 5e-3}) lies_lower(shot.truth().changed_by(rho_m * PoseVector::Unit(4)));
   }
   EXPECT_EQ(higher, asked);
 }

@@ -147,7 +147,7 @@ void add_curve_distance(const Scene& scene, const PoseUnknowns& unknowns, const 
   const Eigen::Vector3d pull = image.d_px_d_point.transpose() * normal;
   UnknownVector row = unknowns.row(point, pull);
   const Eigen::Vector3d axis = unknowns.pose().camera_from_unrolled.rotation * Eigen::Vector3d::UnitZ();
-  row[row.size() - 1] = psi_speed_m * pull.dot(axis);
+  row[psi_unknown] = psi_speed_m * pull.dot(axis);
   equations.add(row, residual_px, cauchy_weight(residual_px / sigma_px, cauchy_scale_sigmas) / (sigma_px * sigma_px));
 }
 
@@ -173,7 +173,7 @@ std::optional<PoseUnknowns> stepped(const Scene& scene, const PoseUnknowns& unkn
   const auto azimuth_direction = [&](double azimuth_rad) -> Eigen::Vector3d {
     return axes * Eigen::Vector3d(-std::sin(azimuth_rad), std::cos(azimuth_rad), 0);
   };
-  NormalEquations equations(unknowns.size());
+  NormalEquations equations;
   for (const SidePoint& side : sides) {
     const double azimuth_rad = view->facing_azimuth_rad + side.side * view->half_visible_rad;
     add_curve_distance(scene, unknowns, point_on(pose, scene.marker, azimuth_rad, side.along_m), axes.col(2), 0,
@@ -187,7 +187,11 @@ std::optional<PoseUnknowns> stepped(const Scene& scene, const PoseUnknowns& unkn
     add_curve_distance(scene, unknowns, point_on(pose, scene.marker, b.azimuth_rad, along_m), tangent, -slope_m,
                        b.raw_px, coarse_fit_limits.boundary_sigma_px, equations);
   }
-  const PoseUnknowns next = unknowns.changed_by(equations.solve(1e-4));
+  if (scene.registration && unknowns.through_rcm()) {
+    const RcmMeasurement rcm = scene.registration->of(pose, coarse_fit_limits.least_rcm_sigma_m);
+    for (const int across : {0, 1}) equations.add(rcm.rows.row(across), rcm.residual[across], 1);
+  }
+  const PoseUnknowns next = unknowns.changed_by(equations.solve(1e-4).head<pose_unknowns>());
   return next.pose().camera_from_unrolled.translation.allFinite() ? std::optional(next) : std::nullopt;
 }
 

@@ -21,6 +21,8 @@ struct CoarseFitLimits {
   /// A section's stretch of colour by the shaft's expected width: less is blood's remainder, more is tissue's.
   double narrowest_section = 0.5, widest_section = 1.4;
 
+  double least_rcm_sigma_m = 1e-4;  ///< of the RCM: a pixel
+
   double min_rotation_score = 0.5;  ///< colours that match less those that contradict, at the best rotation
   /// Of the best score: a rotation 0.7 rad and more away that scores higher is as good.
   double rival_ratio = 0.93;

@@ -258,7 +258,7 @@ InitialPoses initial_poses(const Scene& scene, const Blob& blob) {
     const Eigen::Vector3d axis =
         std::cos(tilt) * image_axis + sign * std::sin(tilt) * Eigen::Vector3d(middle->normalized());
     const Eigen::Vector3d proximal = proximal_at(depth_m - sign * std::sin(tilt) * length_m / 2);
-    poses.push_back(PoseUnknowns::free({frame_along(proximal, axis.normalized()), 0}));
+    poses.push_back(PoseUnknowns({frame_along(proximal, axis.normalized()), 0}, false));
     if (tilt < 0.05) break;
   }
   return initial;

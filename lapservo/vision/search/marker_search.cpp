@@ -32,7 +32,7 @@ CoarseFit fitted_coarsely(const Scene& scene, const PoseUnknowns& start, Rotatio
 }
 
 FineFit fitted(const Scene& scene, const LightImage& light, const PoseUnknowns& start, const EdgeBlur& blur,
-               const ExpectedProcessing& processing, WorkBudget& budget) {
+               const Expected& processing, WorkBudget& budget) {
   FineFit fit = fit_finely(scene, light, start, blur, processing);
   budget.spend(fit.passes * costs.fine_pass + (fit.converged ? costs.fine_end : 0) +
                fit.processing_explained * costs.processing + fit.asked_for_departure * costs.departure);
@@ -50,7 +50,7 @@ Found judged(const Scene& scene, const LightImage& light, FineFit fit, WorkBudge
 }
 
 Found fitted_from(const Scene& scene, const LightImage& light, const PoseUnknowns& start, const EdgeBlur& blur,
-                  const ExpectedProcessing& processing, WorkBudget& budget) {
+                  const Expected& processing, WorkBudget& budget) {
   return judged(scene, light, fitted(scene, light, start, blur, processing, budget), budget);
 }
 
@@ -67,9 +67,8 @@ Found try_start(const Scene& scene, const LightImage& light, const PoseUnknowns&
 
 // Two fits of one marker that are both ok: of what blood leaves both can't be sure.
 bool are_rivals(const FineFit& fit, const FineFit& other) {
-  constexpr double apart_sigmas = 5;  // of the least certain fit that is ok
   const double turn_rad = wrap_pi(fit.unknowns.pose().psi_rad - other.unknowns.pose().psi_rad);
-  return std::abs(turn_rad) > apart_sigmas * validation_limits.max_sigma_psi_rad;
+  return std::abs(turn_rad) > Observation::false_rad;
 }
 
 // No marker moves farther from frame to frame.
@@ -85,7 +84,7 @@ double cost_of_starts(const SearchFrame& frame) {
 InitialPoses starts_in(const SearchFrame& frame, bool through_rcm, const Blob& blob, WorkBudget& budget) {
   InitialPoses starts;
   if (through_rcm)
-    starts.poses = starts_through_rcm(frame.scene, blob, *frame.camera_from_rcm);
+    starts.poses = starts_through_rcm(frame.scene, blob, frame.camera_from_rcm());
   else
     starts = initial_poses(frame.scene, blob);
   budget.spend(starts.poses.empty() ? costs.no_starts : cost_of_starts(frame));
@@ -95,26 +94,13 @@ InitialPoses starts_in(const SearchFrame& frame, bool through_rcm, const Blob& b
 }  // namespace
 
 Found follow(const Scene& scene, const LightImage& light, const PoseUnknowns& expected, const EdgeBlur& blur,
-             const ExpectedProcessing& processing, WorkBudget& budget) {
+             const Expected& processing, WorkBudget& budget) {
   Found near = fitted_from(scene, light, expected, blur, processing, budget);
   if (near.fit || near.status == Status::marker_mismatch) return near;
-  const CoarseFit coarse = fitted_coarsely(scene, expected, Rotation::known, budget);
-  return coarse.found ? fitted_from(scene, light, coarse.unknowns, blur, processing, budget) : Found{};
-}
-
-Found follow_through_rcm(const Scene& scene, const LightImage& light, const FineFit& free,
-                         const Rigid3& camera_from_rcm, WorkBudget& budget) {
-  constexpr double most_sigmas = 3;
-  const auto q = configuration_of(free.unknowns.pose(), camera_from_rcm);
-  if (!q) return {};
-  const PoseUnknowns start = PoseUnknowns::rcm(camera_from_rcm, *q);
-  const Eigen::Vector3d z = Eigen::Vector3d::UnitZ();
-  const Eigen::Vector3d axis =
-      free.unknowns.pose().camera_from_unrolled.rotation.conjugate() * (start.pose().camera_from_unrolled.rotation * z);
-  const Eigen::Vector2d tilt_rad = z.cross(axis).head<2>();  // the first two unknowns of a free pose
-  if (!(tilt_rad.dot(free.covariance.topLeftCorner<2, 2>().inverse() * tilt_rad) < most_sigmas * most_sigmas))
-    return {};
-  return fitted_from(scene, light, start, free.blur, {false, free.bias_px, free.departure}, budget);
+  if (const CoarseFit coarse = fitted_coarsely(scene, expected, Rotation::known, budget); coarse.found)
+    if (Found found = fitted_from(scene, light, coarse.unknowns, blur, processing, budget); found.fit) return found;
+  if (!scene.registration || !expected.through_rcm()) return near;
+  return fitted_from(scene, light, expected.with_rcm(false), blur, processing, budget);
 }
 
 // The starts of one blob, until one fits. Without the RCM they are rivals: all are tried then, in one frame.
@@ -228,7 +214,7 @@ Found MarkerSearch::look_without_rcm(const SearchFrame& frame, WorkBudget& budge
 // print that is off would contradict any registration.
 Found MarkerSearch::despite_registration(const SearchFrame& frame, bool plain_is_known, WorkBudget& budget) {
   Found free = detect(frame, false, free_, budget);
-  if (!free.fit || !is_well_seen(*free.fit)) return {};
+  if (!free.fit || !free.fit->is_well_seen()) return {};
   if (plain_is_known) return free;
   // In this frame a fit through the RCM may be possible where none was before.
   Walk again;
@@ -266,7 +252,7 @@ Found MarkerSearch::hidden(const SearchFrame& frame, WorkBudget& budget) {
   for (const Blob* blob : rest) {
     const auto starts = starts_in(frame, true, *blob, budget).poses;
     for (std::size_t i = hidden_.blobs.start(); i < starts.size(); ++i) {
-      agreement_ = AgreementSearch(starts[i], *frame.camera_from_rcm, frame.scene.marker.length_m());
+      agreement_ = AgreementSearch(starts[i], frame.camera_from_rcm(), frame.scene.marker.length_m());
       hidden_.blobs.stop(*blob, i + 1);
       if (!finish_agreement(frame, budget)) return {};
     }
@@ -317,7 +303,7 @@ Found MarkerSearch::look_with_rcm(const SearchFrame& frame, WorkBudget& budget) 
 }
 
 Found MarkerSearch::look(const SearchFrame& frame, WorkBudget& budget) {
-  Found found = frame.camera_from_rcm ? look_with_rcm(frame, budget) : look_without_rcm(frame, budget);
+  Found found = frame.scene.knows_rcm() ? look_with_rcm(frame, budget) : look_without_rcm(frame, budget);
   const bool nothing_fits = found.status == Status::no_marker || found.status == Status::poor_fit;
   return nothing_fits && other_bands_ ? Found{Status::marker_mismatch, std::nullopt, std::nullopt} : found;
 }

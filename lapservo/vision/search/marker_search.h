@@ -28,20 +28,16 @@ struct SearchFrame {
   const Scene& scene;
   const LightImage& light;
   const std::vector<Blob>& blobs;  ///< of the whole frame, largest first
-  const std::optional<Rigid3>& camera_from_rcm;
+
+  const Rigid3& camera_from_rcm() const { return scene.registration->camera_from_rcm; }
 };
 
-/// The marker near where it is expected.
+/// The marker near where it is expected, at last without regard to the registration.
 Found follow(const Scene& scene, const LightImage& light, const PoseUnknowns& expected, const EdgeBlur& blur,
-             const ExpectedProcessing& processing, WorkBudget& budget);
+             const Expected& processing, WorkBudget& budget);
 
-/// A marker that was followed without regard to the RCM, through it: without a fit where the axis misses it by more
-/// than three sigma, or no fit through it is ok.
-Found follow_through_rcm(const Scene& scene, const LightImage& light, const FineFit& free,
-                         const Rigid3& camera_from_rcm, WorkBudget& budget);
-
-/// Looks for one marker all over a frame: first for what shows plainly, with camera_from_rcm on lines through it, else
-/// by the blobs' outlines; with camera_from_rcm then without regard to it, and at last for markers that are hidden in
+/// Looks for one marker all over a frame: first for what shows plainly, of a well known RCM on lines through it, else
+/// by the blobs' outlines; of a well known RCM then without regard to it, and at last for markers that are hidden in
 /// large parts, which takes tens of milliseconds. What the budget does not allow is done in the frames to come, from
 /// where it stopped. What shows plainly is looked for in each of them.
 class MarkerSearch {

@@ -262,7 +262,7 @@ std::optional<PoseUnknowns> start_of(const Scene& scene, const RaysFromRcm& rays
     alpha_rad = *extent.only_side_rad +
                 extent.away_from_side * scene.marker.radius_m() / (distance_m * std::max(0.05, extent.sine_of_beta));
   const auto q = configuration_through(camera_from_rcm, distance_m * rays.ray(alpha_rad, first_beta_rad));
-  return q ? std::optional(PoseUnknowns::rcm(camera_from_rcm, *q)) : std::nullopt;
+  return q ? std::optional(PoseUnknowns(pose_through_rcm(camera_from_rcm, *q), true)) : std::nullopt;
 }
 
 // Of lines that are split as the scene shows them.

@@ -11,6 +11,7 @@
 #include "lapservo/vision/image/lens_field.h"
 #include "lapservo/vision/observation.h"
 #include "lapservo/vision/shaft/print_sides.h"
+#include "lapservo/vision/shaft/rcm_prior.h"
 #include "lapservo/vision/shaft/shaft_cover.h"
 
 namespace lapservo::internal {
@@ -25,6 +26,7 @@ struct Scene {
   std::span<const ShaftCover* const> others{};  ///< that were found, near enough to hide it or to touch it
   PrintSides known_sides{};                     ///< from which earlier frames showed that its print is the rig's
   double max_p_false = Observation::usual_max_p_false;  ///< TrackerOptions::max_p_false
+  const RcmPrior* registration = nullptr;               ///< of the instrument; nullptr where it is not known
   LensField field{camera};
 
   /// Where the image says nothing of this instrument: beyond its border, or since another one shows there.
@@ -56,6 +58,8 @@ struct Scene {
   bool hidden(const Eigen::Vector2d& raw_px, double depth_m) const {
     return !others.empty() && hidden_by_others(raw_px, depth_m);
   }
+  /// Whether the registration tells on which lines of the image the shaft may lie.
+  bool knows_rcm() const { return registration && registration->is_within(marker.radius_m()); }
   /// Whether it is the class of one of the marker's bands.
   bool is_ours(std::uint8_t colour) const { return colour == bands[0] || colour == bands[1] || colour == bands[2]; }
 

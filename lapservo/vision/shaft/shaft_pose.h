@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <optional>
 
 #include <Eigen/Core>
@@ -22,48 +21,53 @@ struct ShaftPose {
 /// shaft.
 std::optional<double> facing_tau_rad(const Marker& marker, const ShaftPose& pose);
 
+/// By how much a frame is turned about the shaft's axis against another one whose z points nearly the same way.
+double roll_between_rad(const Eigen::Quaterniond& from, const Eigen::Quaterniond& to);
+
+/// The same pose in the unrolled frame of another turn about the axis, in which psi is this.
+ShaftPose in_azimuths_of(const ShaftPose& pose, double psi_rad);
+
+/// Of the shaft through the RCM.
+ShaftPose pose_through_rcm(const Rigid3& camera_from_rcm, const JointVector& q);
+
 /// q of the shaft from the RCM to the marker's proximal end, with the pose's rotation about the axis. Nullopt where
 /// that end is the RCM.
 std::optional<JointVector> configuration_of(const ShaftPose& pose, const Rigid3& camera_from_rcm);
 
-/// Most unknowns of a fit: a pose's six, psi included, and one of the marker.
-inline constexpr int max_unknowns = 7;
-using UnknownVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, max_unknowns, 1>;
-using UnknownMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, max_unknowns, max_unknowns>;
+/// Unknowns of a fit, in this order: rotations about the unrolled frame's x and y [rad], translations along its x, y
+/// and z [m], psi [rad], and of a fine fit the film's thickness (film_sigma_m).
+inline constexpr int pose_unknowns = 6, fit_unknowns = 7, psi_unknown = 5, film_unknown = 6;
+using PoseVector = Eigen::Matrix<double, pose_unknowns, 1>;
+using PoseMatrix = Eigen::Matrix<double, pose_unknowns, pose_unknowns>;
+using UnknownVector = Eigen::Matrix<double, fit_unknowns, 1>;
+using UnknownMatrix = Eigen::Matrix<double, fit_unknowns, fit_unknowns>;
 
-/// The unknowns of a fit. With camera_from_rcm they are q = [theta, phi, rho, psi]; without it the axis' five
-/// (rotations about the unrolled x and y, translations along x, y and z) and psi.
+/// A pose that is fitted.
 class PoseUnknowns {
  public:
-  static PoseUnknowns rcm(const Rigid3& camera_from_rcm, const JointVector& q);
-  static PoseUnknowns free(const ShaftPose& pose);
+  PoseUnknowns() = default;
+  /// `through_rcm`: whether the scene's registration holds the shaft at the RCM (RcmPrior).
+  PoseUnknowns(const ShaftPose& pose, bool through_rcm);
 
-  int size() const { return camera_from_rcm_ ? 4 : 6; }
   const ShaftPose& pose() const { return pose_; }
-  /// Present in the first form.
-  const std::optional<JointVector>& q() const { return q_; }
+  bool through_rcm() const { return through_rcm_; }
 
-  /// Row d(n . p)/d(unknowns) for a point p (camera frame) that moves with the shaft; psi's entry is 0, and so are
-  /// those of as many unknowns `beyond` the pose's.
-  UnknownVector row(const Eigen::Vector3d& point_in_camera, const Eigen::Vector3d& direction, int beyond = 0) const;
+  /// Row d(n . p)/d(unknowns) for a point p (camera frame) that moves with the shaft; 0 for psi and the film.
+  UnknownVector row(const Eigen::Vector3d& point_in_camera, const Eigen::Vector3d& direction) const;
 
   /// The pose after a small change of the unknowns.
-  PoseUnknowns changed_by(const UnknownVector& step) const;
+  PoseUnknowns changed_by(const PoseVector& step) const;
+  /// The change that leads from here to a pose near by, to second order.
+  PoseVector change_to(const PoseUnknowns& other) const;
 
   /// The same pose with another rotation about the axis.
-  PoseUnknowns with_psi(double psi_rad) const;
+  PoseUnknowns with_psi(double psi_rad) const { return {{pose_.camera_from_unrolled, psi_rad}, through_rcm_}; }
+  PoseUnknowns with_rcm(bool through_rcm) const { return {pose_, through_rcm}; }
 
  private:
-  void derive();
-
-  std::optional<Rigid3> camera_from_rcm_;
-  std::optional<JointVector> q_;
   ShaftPose pose_;
-  Eigen::Vector3d pivot_ = Eigen::Vector3d::Zero();
-  // In the order of the unknowns: axes of the two rotations, about the pivot, then directions of the translations.
-  std::array<Eigen::Vector3d, 2> rotations_{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
-  std::array<Eigen::Vector3d, 3> translations_{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(),
-                                               Eigen::Vector3d::Zero()};
+  bool through_rcm_ = false;
+  Eigen::Matrix3d axes_ = Eigen::Matrix3d::Identity();  ///< of the unrolled frame, in the camera's
 };
 
 }  // namespace lapservo::internal

@@ -83,7 +83,7 @@ std::optional<Sighting> MarkerSurvey::detect(const Scene& scene, const LightImag
   std::optional<Sighting> best;
   double best_score = 0;
   const auto try_start = [&](const PoseUnknowns& start) {
-    const CoarseFit coarse = fit_coarsely(scene, PoseUnknowns::free(start.pose()), Rotation::unknown);
+    const CoarseFit coarse = fit_coarsely(scene, start.with_rcm(false), Rotation::unknown);
     if (!coarse.shows_rotation() || coarse.has_rival()) return;
     const auto sighting = refined(scene, light, coarse, {}, {});
     if (!sighting) return;

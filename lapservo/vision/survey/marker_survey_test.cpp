@@ -40,7 +40,7 @@ TEST(MarkerSurvey, LateralChromaticAberrationOfTheRigIsUndone) {
     look(rig, known_rad);
     const scenes::Sight sight(shot.rig, seen);
     const FineFit blind = fit_finely(sight.scene(), sight.light(), shot.truth(true), {}, {.ask = false});
-    blind_rad.push_back(std::abs(wrap_pi(blind.unknowns.q().value().psi_rad - shot.q.psi_rad)));
+    blind_rad.push_back(std::abs(wrap_pi(scenes::q_of(shot.rig, blind.unknowns).psi_rad - shot.q.psi_rad)));
   }
   for (const double error : known_rad) EXPECT_LT(error, 0.004);
   for (const double error : unknown_rad) EXPECT_LT(error, 0.004) << "seen by what it does to the boundaries";

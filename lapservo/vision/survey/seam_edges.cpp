@@ -413,7 +413,7 @@ SeamEdge edge_at(const SeamView& view, double azimuth_rad, double along_m, doubl
   const Eigen::Vector3d pull = image.d_px_d_point.transpose() * (across / px_per_m);
   SeamEdge edge;
   edge.row = view.unknowns.row(point, pull);
-  edge.row[view.unknowns.size() - 1] = radius_m * pull.dot(around);
+  edge.row[psi_unknown] = radius_m * pull.dot(around);
   edge.residual_px = px_per_m * beyond_m;
   edge.sigma_px = std::sqrt(px_per_m * px_per_m * variance_m2 + floor_px * floor_px);
   edge.by_gap_px = moves_with_gap ? -radius_m * pull.dot(around) : 0;

@@ -32,7 +32,7 @@ struct GapShot {
                                 double blur_px = 0.9) const {
     constexpr double reach_m = 0.4e-3;
     const scenes::Sight sight(rig, picture);
-    const auto unknowns = PoseUnknowns::free(scenes::pose_of(rig, 0, q));
+    const PoseUnknowns unknowns(scenes::pose_of(rig, 0, q), false);
     return measure_seam(sight.scene(), sight.light(), unknowns, blur_px, reach_m, true, processing);
   }
   // As a picture without colour differences shows it, which `picture` has blurred.
@@ -43,7 +43,7 @@ struct GapShot {
     cv::cvtColor(picture, luma, cv::COLOR_BGR2GRAY);
     cv::cvtColor(luma, grey, cv::COLOR_GRAY2BGR);
     const scenes::Sight sight(rig, picture), grey_sight(rig, grey);
-    const auto unknowns = PoseUnknowns::free(scenes::pose_of(rig, 0, q));
+    const PoseUnknowns unknowns(scenes::pose_of(rig, 0, q), false);
     return measure_seam(sight.scene(), sight.light(), unknowns, blur_px, reach_m, true, processing,
                         &grey_sight.light());
   }

@@ -1,0 +1,215 @@
+// Standard deviations are whole: over frames and over rigs that are drawn from the sigmas which the rig file holds, the
+// errors of an observation, divided by its sigmas, have unit spread. LAPSERVO_SIGMA_FRAMES and LAPSERVO_SIGMA_SEED set
+// the number of frames of each row (40) and the first seed. Each test prints its rows.
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/core/random.h"
+#include "lapservo/geometry/rotation.h"
+#include "lapservo/sim/renderer.h"
+#include "lapservo/testing/environment.h"
+#include "lapservo/testing/rigs.h"
+#include "lapservo/testing/scenes.h"
+#include "lapservo/vision/tracker.h"
+
+namespace lapservo::acceptance {
+using namespace internal;
+namespace {
+
+using testing::from_environment;
+
+// Sums of squared errors over variances, by quantity.
+class Spread {
+ public:
+  explicit Spread(std::vector<std::string> names) : names_(std::move(names)), squares_(names_.size()) {}
+
+  void add(std::size_t i, double error, double sigma) { squares_[i].push_back(std::pow(error / sigma, 2)); }
+  double of(std::size_t i) const {
+    double sum = 0;
+    for (const double square : squares_[i]) sum += square;
+    return std::sqrt(sum / static_cast<double>(std::max<std::size_t>(1, squares_[i].size())));
+  }
+  double worst() const {
+    double most = 0;
+    for (const auto& squares : squares_)
+      for (const double square : squares) most = std::max(most, std::sqrt(square));
+    return most;
+  }
+  void print(const std::string& row, int told, int frames) const {
+    std::printf("  %-34s told %d of %d; error / sigma:", row.c_str(), told, frames);
+    for (std::size_t i = 0; i < names_.size(); ++i) std::printf(" %s %.2f", names_[i].c_str(), of(i));
+    std::printf("; worst %.1f\n", worst());
+  }
+  void expect(double least, double most) const {
+    for (std::size_t i = 0; i < names_.size(); ++i) {
+      EXPECT_GT(of(i), least) << names_[i];
+      EXPECT_LT(of(i), most) << names_[i];
+    }
+  }
+
+ private:
+  std::vector<std::string> names_;
+  std::vector<std::vector<double>> squares_;
+};
+
+Spread spread_of_q() {
+  return Spread({"theta", "phi", "rho", "psi"});
+}
+
+void add_q(const Observation::Rcm& seen, const JointVector& truth, Spread& spread) {
+  Eigen::Vector4d error = seen.q.vector() - truth.vector();
+  for (const Eigen::Index angle : {0, 1, 3}) error[angle] = wrap_pi(error[angle]);
+  for (Eigen::Index i = 0; i < 4; ++i)
+    spread.add(static_cast<std::size_t>(i), error[i], std::sqrt(seen.covariance(i, i)));
+}
+
+Eigen::Vector3d normal_vector(Random& random) {
+  const double x = random.normal(), y = random.normal();
+  return {x, y, random.normal()};
+}
+
+struct Row {
+  int frames = 0, told = 0;
+  Spread q = spread_of_q();
+
+  void print(const std::string& name) const { q.print(name, told, frames); }
+};
+
+// Frames of rendered scenes of the rig, each tracked by itself with a rig that is drawn about it.
+Row tracked(const Rig& truth, const std::function<Rig(const Rig&, Random&)>& drawn) {
+  Row row;
+  row.frames = static_cast<int>(from_environment("LAPSERVO_SIGMA_FRAMES", 40));
+  const auto first = static_cast<std::uint64_t>(from_environment("LAPSERVO_SIGMA_SEED", 1));
+  for (int i = 0; i < row.frames; ++i) {
+    const std::uint64_t seed = first + static_cast<std::uint64_t>(i);
+    Random random(seed);
+    const JointVector q = scenes::random_configuration(truth, 0, random);
+    const cv::Mat image = scenes::render(truth, {q}, seed);
+    const auto seen = Tracker(drawn(truth, random)).track(image);
+    if (seen[0].status != Status::ok || !seen[0].rcm) continue;
+    ++row.told;
+    add_q(*seen[0].rcm, q, row.q);
+  }
+  return row;
+}
+
+// A registration that is known to so much, about each axis.
+Rig with_registration(Rig rig, double sigma_m, double sigma_rad, Random& random) {
+  Instrument& instrument = rig.instruments[0];
+  Rigid3& transform = *instrument.camera_from_rcm;
+  transform.translation += sigma_m * normal_vector(random);
+  transform.rotation = rotation_by(sigma_rad * normal_vector(random)) * transform.rotation;
+  instrument.registration_covariance.emplace();
+  instrument.registration_covariance->setZero();
+  instrument.registration_covariance->diagonal() << Eigen::Vector3d::Constant(sigma_m * sigma_m),
+      Eigen::Vector3d::Constant(sigma_rad * sigma_rad);
+  return rig;
+}
+
+TEST(RigSigmas, OfARegistrationAreInQ) {
+  for (const auto& [sigma_mm, sigma_mrad] :
+       {std::pair(0.3, 1.0), std::pair(1.0, 5.0), std::pair(3.0, 20.0), std::pair(10.0, 50.0)}) {
+    const Row row = tracked(testing::paper_test_rig(), [&](const Rig& rig, Random& random) {
+      return with_registration(rig, 1e-3 * sigma_mm, 1e-3 * sigma_mrad, random);
+    });
+    char name[64];
+    std::snprintf(name, sizeof name, "registration to %.1f mm, %.0f mrad", sigma_mm, sigma_mrad);
+    row.print(name);
+    EXPECT_GE(row.told, 0.95 * row.frames) << name;
+    row.q.expect(0.7, 1.3);
+  }
+}
+
+// A print whose boundaries are known to so much at either edge: those of the rig are drawn about what is rendered.
+Rig with_print(Rig rig, double sigma_m, Random& random) {
+  Marker& marker = rig.instruments[0].marker;
+  const double end_m = sigma_m * random.normal();  // a circle
+  for (auto* bands_m : {&marker.bands_upper_m, &marker.bands_lower_m}) {
+    const double first_m = sigma_m * random.normal(), second_m = sigma_m * random.normal();
+    (*bands_m)[0] += first_m, (*bands_m)[1] += second_m - first_m, (*bands_m)[2] += end_m - second_m;
+  }
+  const double of_two_m = std::sqrt(2.0) * sigma_m;
+  marker.sigmas.bands_upper_m = marker.sigmas.bands_lower_m = std::array{sigma_m, of_two_m, of_two_m};
+  return rig;
+}
+
+TEST(RigSigmas, OfAPrintAreInPsi) {
+  constexpr double sigma_m = 0.01e-3;
+  const Row row = tracked(testing::paper_test_rig(),
+                          [&](const Rig& rig, Random& random) { return with_print(rig, sigma_m, random); });
+  row.print("print to 0.01 mm");
+  EXPECT_GE(row.told, 0.95 * row.frames);
+  EXPECT_GT(row.q.of(3), 0.7);
+  EXPECT_LT(row.q.of(3), 1.3);
+}
+
+// Errors of the marker's pose: across and along the line of sight, of the axis and about it.
+Spread spread_of_pose() {
+  return Spread({"x y", "z", "axis", "roll"});
+}
+
+void add_pose(const Observation::MarkerPose& seen, const Rigid3& truth, Spread& spread) {
+  const Rigid3 error = truth.inverse() * seen.camera_from_marker;
+  const Eigen::Vector3d moved_m = seen.camera_from_marker.translation - truth.translation;
+  const Eigen::Vector3d axis = error.rotation * Eigen::Vector3d::UnitZ(), x = error.rotation * Eigen::Vector3d::UnitX();
+  spread.add(0, moved_m.head<2>().norm() / std::sqrt(2.0), seen.sigma_xy_m);
+  spread.add(1, moved_m.z(), seen.sigma_z_m);
+  spread.add(2, axis.head<2>().norm(), seen.sigma_axis_rad);
+  spread.add(3, std::atan2(x.y(), x.x()), seen.sigma_roll_rad);
+}
+
+// A camera whose focal lengths, each by itself, are known to a part, and whose response to so much of its values.
+Rig with_camera(Rig rig, double sigma_focal, double sigma_response, Random& random) {
+  Camera& camera = rig.camera;
+  camera.sigmas.fx_px = sigma_focal * camera.fx_px, camera.sigmas.fy_px = sigma_focal * camera.fy_px;
+  camera.fx_px += camera.sigmas.fx_px * random.normal(), camera.fy_px += camera.sigmas.fy_px * random.normal();
+  if (!(sigma_response > 0)) return rig;
+  // v^(1 + x) lies 0.28 x beside v at most, but for another exposure.
+  camera.response.gamma *= 1 + sigma_response / 0.28 * random.normal();
+  camera.response.sigma = sigma_response;
+  return rig;
+}
+
+// Without the registration, which such a camera would not have measured.
+TEST(RigSigmas, OfACameraAreInThePose) {
+  Rig truth = testing::paper_test_rig();
+  truth.camera.response = {Response::Kind::power, 2.2};
+  for (const auto& [sigma_focal, sigma_response] :
+       {std::pair(5e-3, 0.0), std::pair(0.0, 0.02), std::pair(5e-3, 0.02)}) {
+    Spread spread = spread_of_pose();
+    const int frames = from_environment("LAPSERVO_SIGMA_FRAMES", 40);
+    int told = 0;
+    for (int i = 0; i < frames; ++i) {
+      const auto seed = static_cast<std::uint64_t>(from_environment("LAPSERVO_SIGMA_SEED", 1) + i);
+      Random random(seed);
+      const JointVector q = scenes::random_configuration(truth, 0, random);
+      const cv::Mat image = scenes::render(truth, {q}, seed);
+      Rig rig = with_camera(truth, sigma_focal, sigma_response, random);
+      rig.instruments[0].camera_from_rcm.reset();
+      const auto seen = Tracker(rig).track(image);
+      if (seen[0].status != Status::ok) continue;
+      ++told;
+      const Instrument& instrument = truth.instruments[0];
+      const ShaftPose pose = pose_through_rcm(*instrument.camera_from_rcm, q);
+      add_pose(*seen[0].marker, camera_from_marker(instrument.marker, pose.camera_from_unrolled, pose.psi_rad), spread);
+    }
+    char name[64];
+    std::snprintf(name, sizeof name, "focal length to %.1f %%, response %.2f", 100 * sigma_focal, sigma_response);
+    spread.print(name, told, frames);
+    // Pixels that are not square contradict a print.
+    EXPECT_GE(told, 0.8 * frames) << name;
+    spread.expect(0.6, 1.4);
+  }
+}
+
+}  // namespace
+}  // namespace lapservo::acceptance

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "lapservo/rig/rig.h"
+
+namespace lapservo::internal {
+
+/// Of camera_from_rcm: its translation [m], then a rotation vector about the camera's axes [rad]. The rig's, else by
+/// its sigmas, which know no correlations; zero of what it has none of.
+Eigen::Matrix<double, 6, 6> registration_covariance(const Instrument& instrument);
+
+/// The same of a covariance of a rotation about the RCM frame's own axes, then of the translation.
+Eigen::Matrix<double, 6, 6> in_camera_axes(const Rigid3& camera_from_rcm,
+                                           const Eigen::Matrix<double, 6, 6>& of_rotation_and_translation);
+
+}  // namespace lapservo::internal

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <optional>
+
+#include <Eigen/Core>
+
+#include "lapservo/rig/rig.h"
+#include "lapservo/vision/shaft/shaft_pose.h"
+
+namespace lapservo::internal {
+
+using RegistrationMatrix = Eigen::Matrix<double, 6, 6>;
+
+/// That a shaft's axis passes the RCM, as a measurement of the pose: its two distances from the RCM, 0 within what the
+/// registration is known to. In units of their sigma, independent of one another.
+struct RcmMeasurement {
+  Eigen::Matrix<double, 2, fit_unknowns> rows = Eigen::Matrix<double, 2, fit_unknowns>::Zero();
+  Eigen::Vector2d residual = Eigen::Vector2d::Zero();
+  /// d(residual)/d(RCM in the camera frame) [1/m].
+  Eigen::Matrix<double, 2, 3> by_rcm_m = Eigen::Matrix<double, 2, 3>::Zero();
+};
+
+/// What a rig knows of where an instrument's RCM frame is.
+struct RcmPrior {
+  Rigid3 camera_from_rcm;
+  /// Covariance of the translation [m], then of a rotation vector about the camera's axes [rad]. Zero of a registration that
+  /// counts as exact.
+  RegistrationMatrix covariance = RegistrationMatrix::Zero();
+
+  /// The distances count as known to `least_sigma_m` at best: a rough pose is held at the RCM as well as it is known.
+  RcmMeasurement of(const ShaftPose& pose, double least_sigma_m) const;
+  /// Whether the RCM is known to within this radius, so that the lines through it lie on their shafts.
+  bool is_within(double radius_m) const;
+};
+
+/// Nullopt where the rig knows nothing of it.
+std::optional<RcmPrior> registration_of(const Instrument& instrument);
+
+/// q by a pose and a registration, and how sure it is by both, in the order theta, phi, rho, psi; to first order.
+struct ConfigurationEstimate {
+  JointVector q;
+  Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
+};
+
+/// `pose_by_registration`: covariance of the pose's unknowns with the registration's numbers. Nullopt where the pose
+/// has no q.
+std::optional<ConfigurationEstimate> configuration_estimate(
+    const PoseUnknowns& unknowns, const PoseMatrix& covariance, const RcmPrior& registration,
+    const Eigen::Matrix<double, pose_unknowns, 6>& pose_by_registration);
+
+}  // namespace lapservo::internal
