@@ -7,10 +7,10 @@
 #include <cstddef>
 #include <utility>
 
-#include "lapservo/calibration/fit/departures.h"
 #include "lapservo/calibration/fit/linear_fit.h"
 #include "lapservo/calibration/fit/robust_scale.h"
 #include "lapservo/calibration/fit/solve_quietly.h"
+#include "lapservo/core/departures.h"
 #include "lapservo/geometry/rotation.h"
 
 namespace lapservo::internal {

@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "lapservo/calibration/fit/departures.h"
+#include "lapservo/core/departures.h"
 
 namespace lapservo::internal {
 
