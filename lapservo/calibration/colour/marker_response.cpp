@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include "lapservo/calibration/fit/robust_scale.h"
 #include "lapservo/core/statistics.h"

@@ -257,7 +257,7 @@ std::vector<std::string> texts_of(const std::vector<PrintFault>& faults) {
                       ? "the print slips by %.3f mm about %.0f s after the start: fasten it and "
                         "record again"
                       : "a boundary of the print bows by %.3f mm between its ends: print and cut it straight",
-                  1e3 * std::abs(fault.size_m), fault.from_s);
+                  1e3 * std::abs(fault.size), fault.from_s);
     texts.emplace_back(text);
   }
   return texts;
