@@ -94,12 +94,13 @@ std::optional<BacklashEstimate> BacklashEstimator::estimate(int index) const {
   const double curvature = (left - 2 * centre + right) / (step * step);
   if (!(curvature > 0)) return std::nullopt;
   const double shift = (left - right) / (2 * step * curvature);
-  // A sum of squares grows by 1 at one sigma. An unexplained residual counts as noise that persists over several
-  // frames.
-  constexpr double frames_alike = 4;
-  const double misfit = std::max(1.0, squares[lowest] / joint.weight);
+  // A sum of squares grows by 1 at one sigma. Noise persists over several frames. A residual beyond the noise
+  // persists over whole swings: it looks as much like a gap as smooth motions look like one another. departures_of()
+  // can't name its cause: those that it could look for are nuisances already.
+  constexpr double frames_alike = 4, likeness = 0.3;
+  const double beyond_noise = std::max(0.0, squares[lowest] - joint.weight);
   return BacklashEstimate{std::clamp(width(index, middle) + shift, 0.0, config_.largest[index]),
-                          std::sqrt(2 / curvature * misfit * frames_alike)};
+                          std::sqrt(2 / curvature * (frames_alike + likeness * likeness * beyond_noise))};
 }
 
 }  // namespace lapservo::internal

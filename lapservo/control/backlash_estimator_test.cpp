@@ -1,6 +1,8 @@
 #include "lapservo/control/backlash_estimator.h"
 
+#include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <functional>
 
 #include <gtest/gtest.h>
@@ -19,6 +21,7 @@ struct World {
   Eigen::Vector4d noise{3e-4, 3e-4, 2e-5, 3e-3};
   Eigen::Matrix4d model_error = Eigen::Matrix4d::Zero();  ///< in joint scales
   double delay_error_s = 0;
+  double bend = 0, wobble = 0;  ///< of the response to insertion and roll, and of what else moves them
   std::function<Eigen::Vector4d(double)> q_measured = [](double t) {
     return Eigen::Vector4d(0.05 * std::sin(0.7 * t), 0.03 * std::sin(0.5 * t), 0.006 * std::sin(two_pi / 10 * t),
                            0.7 * std::sin(two_pi / 12 * t + 1));
@@ -39,6 +42,10 @@ struct World {
         seen[i] += state.instrument(backlash[i]) + noise[i] * random.normal();
       }
       seen += scales.joints.cwiseProduct(model_error * then.cwiseQuotient(scales.joints));
+      const Eigen::Vector4d size(0, 0, 2e-4, 0.04);
+      seen +=
+          bend * size.cwiseProduct((3 * then.cwiseQuotient(Eigen::Vector4d(1, 1, 0.006, 0.7))).array().sin().matrix());
+      seen += wobble * size * std::sin(1.9 * t);
       estimator.follow(q);
       estimator.add(t, (q - q_measured(t - 0.05)) / 0.05, seen, noise.cwiseAbs2().asDiagonal());
     }
@@ -104,6 +111,44 @@ TEST(BacklashEstimator, IsNotFooledByAWrongDelayOrModel) {
         }
       }
     }
+  }
+}
+
+// Prints how many widths are sure enough to count, and their errors: with each fault, none is off by more than its
+// sigma says.
+TEST(BacklashEstimator, SigmaHoldsWhereNoBacklashExplainsTheImages) {
+  const auto tell = [&](const char* name, double part, const std::function<void(World&, double)>& change) {
+    int sure = 0, wrong = 0;
+    double squares = 0;
+    for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+      World world;
+      world.backlash *= 0.5 + 0.15 * static_cast<double>(seed);
+      change(world, part);
+      const BacklashEstimator estimator = world.watched(seed % 2 ? 20 : 40, seed);
+      for (const int i : {2, 3}) {
+        const auto found = estimator.estimate(i);
+        if (!found || found->sigma > BacklashEstimatorConfig{}.max_sigma * BacklashEstimatorConfig{}.largest[i])
+          continue;
+        const double z = (found->width - world.backlash[i]) / found->sigma;
+        ++sure, squares += z * z, wrong += std::abs(z) > 4;
+      }
+    }
+    const double error = std::sqrt(squares / std::max(1, sure));
+    std::printf("  %-20s %4.2f: sure of %2d, off by more than 4 sigmas %2d, error / sigma %.2f\n", name, part, sure,
+                wrong, error);
+    EXPECT_EQ(wrong, 0) << name;
+    EXPECT_LT(error, 1.4) << name;
+    return sure;
+  };
+  EXPECT_EQ(tell("clean", 0, [](World&, double) {}), 20);
+  for (const double part : {0.03, 0.1, 0.3, 1.0}) {
+    tell("a wrong delay", part, [](World& world, double by) { world.delay_error_s = 0.02 * by; });
+    tell("a wrong model", part, [](World& world, double by) {
+      Random random(7);
+      for (double& entry : world.model_error.reshaped()) entry = 0.3 * by * random.normal();
+    });
+    tell("a bent response", part, [](World& world, double by) { world.bend = by; });
+    tell("a wobble", part, [](World& world, double by) { world.wobble = by; });
   }
 }
 

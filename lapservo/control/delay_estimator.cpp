@@ -6,6 +6,8 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 
+#include "lapservo/core/departures.h"
+
 namespace lapservo::internal {
 namespace {
 
@@ -28,14 +30,19 @@ void DelayEstimator::add(double stamp_s, const Eigen::Vector4d& q_image, const E
   const double kept = std::exp(-interval_s / config_.forgetting_s);
   // A plain mean at first, a running one once the time constant has passed.
   const double fraction = std::max(1 / (1 + since_), -std::expm1(-interval_s / config_.offset_time_s));
+  const Eigen::Vector4d moved = q_image - mean_;
   for (std::size_t i = 0; i < candidates; ++i) {
     Candidate& candidate = grid_[i];
     const Eigen::Vector4d difference = q_image - *history.at(stamp_s - step_s * static_cast<double>(i));
     const Eigen::Vector4d before = difference - candidate.mean;
     candidate.mean += fraction * before;
     candidate.squares = kept * candidate.squares + (1 - fraction) * before.dot(information * before);
+    candidate.mixed = kept * candidate.mixed + (1 - fraction) * moved * (information * before).transpose();
   }
-  const Eigen::Vector4d moved = q_image - mean_;
+  const Eigen::Matrix4d places = (1 - fraction) * moved * moved.transpose();
+  for (Eigen::Index i = 0; i < 4; ++i)
+    for (Eigen::Index j = 0; j < 4; ++j)
+      by_model_.block<4, 4>(4 * i, 4 * j) = kept * by_model_.block<4, 4>(4 * i, 4 * j) + information(i, j) * places;
   mean_ += fraction * moved;
   squares_ = kept * squares_ + (1 - fraction) * moved.dot(information * moved);
   const Eigen::Vector4d rate = (*history.at(stamp_s) - *history.at(stamp_s - span_s)) / span_s;
@@ -45,6 +52,30 @@ void DelayEstimator::add(double stamp_s, const Eigen::Vector4d& q_image, const E
   seen_s_ += interval_s;
   last_stamp_s_ = stamp_s;
   started_ = true;
+}
+
+// The square of the delay's error by a wrong model, where it shows: each joint's place in the image may be off by a
+// multiple of each joint's. The estimator keeps sums of squares and products, not frames: each matrix that has the same
+// products gives the same fit.
+double DelayEstimator::variance_by_model(std::size_t candidate, double shift_s) const {
+  constexpr Eigen::Index faults = 16, all = faults + 2;
+  const Candidate &left = grid_[candidate - 1], &centre = grid_[candidate], &right = grid_[candidate + 1];
+  const double curvature = (left.squares - 2 * centre.squares + right.squares) / (step_s * step_s);
+  const Eigen::Matrix4d by_delay = (right.mixed - left.mixed) / (2 * step_s), mixed = centre.mixed + shift_s * by_delay;
+  Eigen::Matrix<double, all, all> products = Eigen::Matrix<double, all, all>::Zero();
+  products(0, 0) = curvature / 2;
+  products.block<faults, 1>(1, 0) = by_delay.reshaped();
+  products.block<faults, faults>(1, 1) = by_model_;
+  products.block<1, faults>(all - 1, 1) = mixed.reshaped().transpose();
+  products(all - 1, all - 1) = centre.squares - shift_s * shift_s * curvature / 2;
+  const Eigen::LDLT<Eigen::Matrix<double, all, all>> factor(products);
+  Eigen::MatrixXd rows = factor.transpositionsP().transpose() * Eigen::MatrixXd(factor.matrixL());
+  rows = (rows * factor.vectorD().cwiseMax(0).cwiseSqrt().asDiagonal()).transpose().eval();
+  LinearFit fit;
+  fit.jacobian = rows.leftCols(1).sparseView(), fit.residuals = rows.col(all - 1);
+  fit.noise = std::sqrt(frames_alike);
+  const Departures departures = departures_of(fit, rows.middleCols(1, faults));
+  return departures.by_seen(0, 0) + departures.by_instead(0, 0);
 }
 
 std::optional<DelayEstimate> DelayEstimator::estimate() const {
@@ -60,7 +91,7 @@ std::optional<DelayEstimate> DelayEstimator::estimate() const {
   // A sum of squares grows by 1 at one sigma. A residual that the measured joints do not explain counts as noise that
   // persists over several frames.
   const double misfit = std::max(1.0, lowest->squares / (4 * weight_));
-  const double sigma_s = std::sqrt(2 / curvature * misfit * frames_alike);
+  const double sigma_s = std::sqrt(2 / curvature * misfit * frames_alike + variance_by_model(middle, shift_s));
   if (!(sigma_s <= config_.max_sigma_s)) return std::nullopt;
   return DelayEstimate{delay_s, sigma_s};
 }

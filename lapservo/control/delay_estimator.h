@@ -19,7 +19,8 @@ struct DelayEstimate {
 /// How old the image is, from the data: the image's joint positions are compared with the measured joints at each of a
 /// grid of delays. The offset between both is removed as a running mean; what remains is, for each candidate, a sum of
 /// squares, and the lowest sum is the likeliest delay, refined by a parabola through its neighbours. Its curvature is
-/// the information: without motion all candidates are alike, sigma is large and there is no estimate.
+/// the information: without motion all candidates are alike, sigma is large and there is no estimate. Sigma counts what
+/// a wrong model does to the delay, where it shows.
 class DelayEstimator {
  public:
   static constexpr double step_s = 0.005;
@@ -45,7 +46,11 @@ class DelayEstimator {
   struct Candidate {
     Eigen::Vector4d mean = Eigen::Vector4d::Zero();  ///< of q_image - q_joint
     double squares = 0;
+    Eigen::Matrix4d mixed = Eigen::Matrix4d::Zero();  ///< the weighted rest by where the joints are
   };
+  /// At the lowest sum of squares, between its candidate and a neighbour.
+  double variance_by_model(std::size_t candidate, double shift_s) const;
+
   DelayEstimatorConfig config_;
   std::array<Candidate, candidates> grid_;
   double last_stamp_s_ = 0;
@@ -54,7 +59,9 @@ class DelayEstimator {
   double since_ = 0;                                ///< frames since the last interruption
   Eigen::Vector4d mean_ = Eigen::Vector4d::Zero();  ///< of q_image
   double squares_ = 0;                              ///< of q_image less its mean
-  double information_per_s2_ = 0;                   ///< that the joints' motion gives of a delay, forgotten likewise
+  /// Products of the joints' places in the image, for each pair of joints that may be off by them, forgotten likewise.
+  Eigen::Matrix<double, 16, 16> by_model_ = Eigen::Matrix<double, 16, 16>::Zero();
+  double information_per_s2_ = 0;  ///< that the joints' motion gives of a delay, forgotten likewise
   bool started_ = false;
 };
 

@@ -32,10 +32,6 @@ namespace fs = std::filesystem;
 constexpr std::uint32_t max_side_px = 16384;
 constexpr std::size_t max_bytes = std::size_t{256} << 20;
 
-std::string_view text_of(std::span<const std::uint8_t> bytes) {
-  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-}
-
 bool starts_with(std::span<const std::uint8_t> bytes, std::string_view magic) {
   return bytes.size() >= magic.size() && std::memcmp(bytes.data(), magic.data(), magic.size()) == 0;
 }

@@ -8,7 +8,10 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <fmt/format.h>
 
+#include "lapservo/core/dense_matrix.h"
+#include "lapservo/core/departures.h"
 #include "lapservo/core/random.h"
 #include "lapservo/core/words.h"
 
@@ -187,6 +190,109 @@ double lever_px(const Lines& lines, const Eigen::Vector2d& o) {
   return std::max((o - middle).norm(), length_px);
 }
 
+// More than a third left out, or the others beyond three sigmas of chance (Wilson and Hilferty 1931).
+bool is_beyond_noise(const RobustFit& robust) {
+  const auto inside = static_cast<double>(std::count(robust.used.begin(), robust.used.end(), true));
+  if (3 * inside < 2 * static_cast<double>(robust.used.size())) return true;
+  const double freedom = inside - 2, part = 2 / (9 * std::max(1.0, freedom));
+  return freedom > 0 && robust.fit.chi2 > freedom * std::pow(1 - part + 3 * std::sqrt(part), 3);
+}
+
+// How the lines' misses move with the point, and what a steady motion of the point adds from the first line to the last
+// (px): it lies as far from the middle of the motion as the other lines' do, rms, so that sigma counts the motion.
+struct Slopes {
+  Eigen::VectorXd sigmas;
+  Eigen::MatrixXd by_point, by_motion;
+
+  Slopes(const Lines& lines, const Eigen::Vector2d& o) {
+    const auto count = static_cast<Eigen::Index>(lines.size());
+    sigmas.resize(count), by_point.resize(count, 2), by_motion.resize(count, 2);
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const Miss m = miss(lines[static_cast<std::size_t>(i)], o);
+      const double time = (static_cast<double>(i) + 0.5) / static_cast<double>(count);
+      sigmas[i] = m.sigmas, by_point.row(i) = m.d_sigmas_d_o.transpose();
+      by_motion.row(i) = (time - 0.5 - 1 / std::sqrt(12.0)) * m.d_sigmas_d_o.transpose();
+    }
+  }
+};
+
+// The likeliest motion, and its covariance for misses of unit noise.
+struct Motion {
+  Eigen::Vector2d px;
+  Eigen::Matrix2d covariance_px2;
+
+  explicit Motion(const Slopes& at) {
+    Eigen::MatrixXd both(at.sigmas.size(), 4);
+    both << at.by_point, at.by_motion;
+    const Eigen::MatrixXd covariance = inverse_of_symmetric(product(both.transpose(), both));
+    px = -product(covariance, product(both.transpose(), at.sigmas)).bottomRows(2);
+    covariance_px2 = covariance.bottomRightCorner(2, 2);
+  }
+};
+
+// Slopes of each line's miss by the bend at the border of the observed points, and by the distance of the first and of
+// the second ends from the lines (px).
+Eigen::Matrix<double, Eigen::Dynamic, 3> slopes_by_ends(const Lines& lines, const Eigen::Vector2d& o) {
+  Eigen::Vector2d middle = Eigen::Vector2d::Zero();
+  for (const LineObservation& line : lines)
+    middle += (line.from_px + line.to_px) / 2 / static_cast<double>(lines.size());
+  double border_px = 1;
+  for (const LineObservation& line : lines)
+    border_px = std::max({border_px, (line.from_px - middle).norm(), (line.to_px - middle).norm()});
+  Eigen::Matrix<double, Eigen::Dynamic, 3> slopes(lines.size(), 3);
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    const Eigen::Vector2d along = (lines[i].to_px - lines[i].from_px).normalized(), normal(along.y(), -along.x());
+    const auto bent = [&](const Eigen::Vector2d& end_px) {
+      const Eigen::Vector2d at = (end_px - middle) / border_px;
+      return at.squaredNorm() * at.dot(normal);
+    };
+    const Eigen::Vector2d by_ends = miss(lines[i], o).d_sigmas_d_ends;
+    slopes.row(static_cast<Eigen::Index>(i))
+        << by_ends.dot(Eigen::Vector2d(bent(lines[i].from_px), bent(lines[i].to_px))),
+        by_ends.transpose();
+  }
+  return slopes;
+}
+
+std::string text_of(const Fault& fault) {
+  const double px = std::abs(fault.size);
+  if (fault.which == 0)
+    return fmt::format(
+        "the RCM moves by {:.2g} px in the image from the first line to the last: fasten the trocar, the endoscope and "
+        "the arm's base, and record again",
+        px);
+  if (fault.which == 1)
+    return fmt::format(
+        "the lines bend as by a lens, by {:.2g} px at the border of the observed points: undistort them by a "
+        "calibration of "
+        "this camera",
+        px);
+  return fmt::format(
+      "the lines pass the RCM on one side, one end of all of them is {:.2g} px beside the shaft's axis: light the "
+      "shaft evenly, mount the marker straight",
+      px);
+}
+
+// Finds the faults that lines through one point do not have, where there are enough lines to distinguish them.
+void count_departures(const Lines& lines, RcmEstimate& estimate) {
+  constexpr std::size_t enough = 12;
+  if (lines.size() < enough) return;
+  const Slopes at(lines, estimate.point_px);
+  LinearFit fit;
+  fit.residuals = at.sigmas, fit.jacobian = at.by_point.sparseView();
+  fit.noise = std::max(1e-9, estimate.noise_factor);
+  Eigen::MatrixXd slopes(at.sigmas.size(), 4);
+  const Motion motion(at);
+  slopes << product(at.by_motion, motion.px.normalized()), slopes_by_ends(lines, estimate.point_px);
+  const Departures departures = departures_of(fit, slopes);
+  *estimate.covariance_px2 += departures.by_seen + departures.by_instead;
+  for (const Fault& fault : departures.seen) {
+    estimate.faults.push_back(text_of(fault));
+    // In which direction it moves is not known either.
+    if (fault.which == 0) *estimate.covariance_px2 += fit.noise * fit.noise * motion.covariance_px2 / 12;
+  }
+}
+
 double larger_sigma(const Eigen::Matrix2d& covariance) {
   return std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>()
                        .computeDirect(covariance, Eigen::EigenvaluesOnly)
@@ -222,7 +328,10 @@ RcmEstimate estimate_projected_rcm(std::span<const LineObservation> given, const
     estimate.status = RcmStatus::parallel;
     return estimate;
   }
-  const auto [best, used] = fit_robustly(lines, *start, options.scale);
+  RobustFit robust = fit_robustly(lines, *start, options.scale);
+  const bool beyond = options.scale == NoiseScale::known && robust.fit.converged && is_beyond_noise(robust);
+  if (beyond) robust = fit_robustly(lines, *start, NoiseScale::estimated);
+  const auto& [best, used] = robust;
   const Eigen::Matrix2d as_given = best.information.inverse();
   if (!best.converged || !best.point_px.allFinite() || !as_given.allFinite()) {
     estimate.status = RcmStatus::not_converged;
@@ -239,11 +348,15 @@ RcmEstimate estimate_projected_rcm(std::span<const LineObservation> given, const
   estimate.chi2 = best.chi2;
   estimate.degrees_of_freedom = static_cast<int>(inside.size()) - 2;
   estimate.direction_spread_rad = direction_spread_rad(inside);
-  if (options.scale == NoiseScale::estimated) estimate.noise_factor = scale_of(best.chi2, inside.size());
+  if (options.scale == NoiseScale::estimated || beyond) estimate.noise_factor = scale_of(best.chi2, inside.size());
   if (options.scale == NoiseScale::known || estimate.degrees_of_freedom > 0)
     estimate.covariance_px2 =
         estimate.noise_factor * estimate.noise_factor * as_given +
         options.common_px * options.common_px * common_covariance(inside, best.point_px, as_given);
+  if (estimate.covariance_px2) count_departures(inside, estimate);
+  if (beyond && estimate.faults.empty())
+    estimate.faults.push_back(fmt::format(
+        "the lines miss one another by {:.2g} times their own sigmas, which are too small", estimate.noise_factor));
   const double fraction =
       estimate.covariance_px2 ? larger_sigma(*estimate.covariance_px2) / lever_px(inside, best.point_px) : 0;
   estimate.near_parallel = estimate.direction_spread_rad < near_parallel_rad || fraction > near_parallel_fraction;

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <optional>
 #include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -14,7 +15,7 @@ namespace lapservo {
 
 /// Whether the lines' covariances are absolute, or only their proportions are valid.
 enum class NoiseScale {
-  known,      ///< chi2 then tests them
+  known,      ///< chi2 then tests them: beyond chance, the factor is estimated
   estimated,  ///< one factor for all is estimated from how badly the lines meet
 };
 
@@ -41,7 +42,7 @@ struct RcmEstimate {
   std::optional<Eigen::Matrix2d> covariance_px2;
   double chi2 = 0;             ///< of the lines used, in units of their covariances as given
   int degrees_of_freedom = 0;  ///< lines used - 2
-  double noise_factor = 1;     ///< by which the given standard deviations are too small; 1 when they are known
+  double noise_factor = 1;     ///< by which the given standard deviations are too small; 1 when known ones hold
   std::vector<bool> used;      ///< per line given: neither unusable nor an outlier
   std::size_t lines = 0;       ///< usable ones
   std::size_t outliers = 0;    ///< of them
@@ -52,6 +53,9 @@ struct RcmEstimate {
   /// becomes one some 20 times as large along them), or the larger sigma exceeds 5 % of the distance from the observed
   /// points to the estimate.
   bool near_parallel = false;
+  /// Faults that show in the lines beyond their noise, one sentence each, the clearest first: the covariance counts
+  /// them.
+  std::vector<std::string> faults;
 };
 
 /// Lines whose directions spread by less are parallel: e0 and e3 are known to no better than this over their distance.
@@ -68,7 +72,8 @@ inline constexpr double near_parallel_fraction = 0.05;
 /// Robust from six lines up: starts at the pair's intersection with the least median residual (least median of squares,
 /// Rousseeuw 1984), then leaves out lines farther off than 3.5 standard deviations; up to about a third may be wrong.
 /// The covariance takes errors, but for the common one, as independent from line to line: consecutive frames of a shaft
-/// at rest are one line.
+/// at rest are one line. Lines are in the order of time: if the point moves, its covariance
+/// counts that, too.
 RcmEstimate estimate_projected_rcm(std::span<const LineObservation> lines, const RcmOptions& options = {});
 
 }  // namespace lapservo

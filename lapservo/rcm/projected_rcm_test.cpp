@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <functional>
 #include <limits>
+#include <string>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
@@ -234,6 +237,86 @@ TEST(ProjectedRcm, WarnsOfNearlyParallelLines) {
     EXPECT_FALSE(of_fan(0.9, 1).near_parallel) << "seed " << seed;
     EXPECT_TRUE(of_fan(0.05, 0.01).near_parallel) << "seed " << seed;  // by their directions
     EXPECT_TRUE(of_fan(0.3, 60).near_parallel) << "seed " << seed;     // by what the noise makes of them
+  }
+}
+
+// A fault of a fan of lines that no one point explains, with a size in px.
+const Eigen::Vector2d moves(0.6, 0.8);  // the RCM, from the first line to the last
+struct Departure {
+  std::string name, cause;
+  std::function<void(LineObservation&, double part, const Eigen::Vector2d& normal, double px)> apply;
+};
+
+std::vector<Departure> departures() {
+  const Eigen::Vector2d middle(560, -10);
+  return {{"the RCM moves", "the RCM moves by",
+           [](LineObservation& line, double part, const Eigen::Vector2d&, double px) {
+             const Eigen::Vector2d off = (part - 0.5) * px * moves;
+             line.from_px += off, line.to_px += off;
+           }},
+          {"a lens", "bend as by a lens",
+           [=](LineObservation& line, double, const Eigen::Vector2d&, double px) {
+             for (Eigen::Vector2d* end : {&line.from_px, &line.to_px})
+               *end += px * ((*end - middle) / 500).squaredNorm() * (*end - middle) / 500;
+           }},
+          {"one end beside the axis", "on one side",
+           [](LineObservation& line, double, const Eigen::Vector2d& normal, double px) { line.to_px += px * normal; }},
+          {"noise beyond the sigmas", "their own sigmas", {}}};
+}
+
+// Refuses nothing: sigmas hold for what is said, and for what is too small to be seen.
+TEST(ProjectedRcm, NamesWhatNoPointExplainsAndItsSigmaHolds) {
+  constexpr std::uint64_t seed = 91;
+  constexpr int trials = 100;
+  const Eigen::Vector2d truth(-120, -240);
+  Random random(seed);
+  const auto tell = [&](const Departure* departure, double px, NoiseScale scale) {
+    int told = 0, named = 0, wrong = 0;
+    double squares = 0;
+    for (int trial = 0; trial < trials; ++trial) {
+      Lines lines = testing::fan_of_lines(truth, 40, fan_rad, random);
+      const bool noisy = departure && !departure->apply;
+      for (std::size_t i = 0; i < lines.size(); ++i) {
+        const Eigen::Vector2d along = (lines[i].to_px - lines[i].from_px).normalized();
+        if (departure && !noisy)
+          departure->apply(lines[i], (static_cast<double>(i) + 0.5) / static_cast<double>(lines.size()),
+                           {along.y(), -along.x()}, px);
+        lines[i] = testing::with_error(lines[i], noisy ? px : 1, random);
+      }
+      const RcmEstimate estimate = estimate_projected_rcm(lines, {scale});
+      EXPECT_EQ(estimate.status, RcmStatus::ok);
+      // At some time of the recording.
+      const bool drifts = departure && departure->cause == "the RCM moves by";
+      const Eigen::Vector2d off =
+          drifts ? Eigen::Vector2d(px * random.uniform(-0.5, 0.5) * moves) : Eigen::Vector2d::Zero();
+      const double z2 = mahalanobis2(estimate, truth + off) / 2;
+      squares += z2 / trials, wrong += z2 > 16;
+      told += !estimate.faults.empty();
+      named += departure && !estimate.faults.empty() && estimate.faults[0].find(departure->cause) != std::string::npos;
+    }
+    std::printf("  %-24s %5.1f %s: said %3d, of these rightly %3d, off by more than 4 sigmas %d, error / sigma %.2f\n",
+                departure ? departure->name.c_str() : "clean", px, scale == NoiseScale::known ? "known" : "by scatter",
+                told, named, wrong, std::sqrt(squares));
+    if (px > 1 || !departure) {
+      EXPECT_LE(wrong, trials / 100) << "seed " << seed;
+      EXPECT_LT(std::sqrt(squares), 1.4) << "seed " << seed;
+    }
+    if (!departure) {
+      EXPECT_LE(told, trials / 20) << "seed " << seed;
+    }
+    return std::pair(told, named);
+  };
+  for (const NoiseScale scale : {NoiseScale::known, NoiseScale::estimated}) {
+    tell(nullptr, 0, scale);
+    for (const Departure& departure : departures())
+      for (const double px : {1.0, 10.0}) {
+        if (!departure.apply && scale == NoiseScale::estimated) continue;  // it is what is estimated
+        const auto [told, named] = tell(&departure, px, scale);
+        EXPECT_GE(named, 0.8 * told - trials / 20) << departure.name;
+        if (px == 10) {
+          EXPECT_GE(named, 0.9 * trials) << departure.name;
+        }
+      }
   }
 }
 

@@ -27,7 +27,7 @@ RcmResult weighted_result(const std::vector<LineObservation>& lines, double sigm
   if (estimate.degrees_of_freedom > 0)
     result.noise_px = (known ? sigma_px : 1) * std::sqrt(estimate.chi2 / estimate.degrees_of_freedom);
   result.spread_rad = estimate.direction_spread_rad;
-  result.near_parallel = estimate.near_parallel;
+  result.near_parallel = estimate.near_parallel, result.faults = estimate.faults;
   return result;
 }
 

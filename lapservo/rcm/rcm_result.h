@@ -21,6 +21,7 @@ struct RcmResult {
   std::optional<Eigen::Matrix2d> covariance_px2;
   std::optional<double> noise_px, chi2, spread_rad;
   bool near_parallel = false;
+  std::vector<std::string> faults;        ///< RcmEstimate::faults
   std::optional<Eigen::Vector2d> rig_px;  ///< the RCM by the rig's camera_from_rcm
 };
 

@@ -157,6 +157,7 @@ py::dict calibrate_colour(const py::object& frames, const py::object& rig, const
   result["hues_deg"] = calibration.hues_deg;
   result["sigma_hues_deg"] = calibration.sigma_hues_deg;
   result["response"] = calibration.response_found;
+  result["faults"] = calibration.faults;
   result["found_before"] = calibration.found_before;
   result["found"] = calibration.found;
   result["frames"] = measured.frames;

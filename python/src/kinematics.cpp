@@ -86,7 +86,8 @@ q is float[4]: theta, phi [rad], rho [m], psi [rad]; features are float[4]: s [r
           "float[2, 2]; None when there are too few lines")
       .def_readonly("lines", &RcmEstimate::lines, "positions that differ")
       .def_readonly("outliers", &RcmEstimate::outliers, "of them")
-      .def_readonly("near_parallel", &RcmEstimate::near_parallel, "the estimate is poor along the lines");
+      .def_readonly("near_parallel", &RcmEstimate::near_parallel, "the estimate is poor along the lines")
+      .def_readonly("faults", &RcmEstimate::faults, "list[str]: what shows beyond the noise and the covariance counts");
   m.def("estimate_rcm", &estimate_rcm, py::arg("observations"), py::kw_only(), py::arg("common_px") = 0.01,
         "RcmEstimate from one instrument's observations; those that are not ok don't count. They must come from a rig "
         "without camera_from_rcm, or they show where it has the RCM. common_px: an error that all share.");

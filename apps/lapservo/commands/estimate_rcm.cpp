@@ -113,6 +113,8 @@ void print(const RcmResult& r) {
   if (r.chi2) line += fmt::format(", chi2 {:.1f} of {}", *r.chi2, r.lines - r.outliers - 2);
   if (r.rig_px) line += fmt::format("; {:.2f} px from the rig's", (*r.point_px - *r.rig_px).norm());
   std::printf("%s %s\n", head.c_str(), line.c_str());
+  for (const std::string& fault : r.faults)
+    std::printf("%s: beyond the noise, counted in sigma: %s\n", r.instrument.c_str(), fault.c_str());
 }
 
 // Warns of lines that make the numbers unreliable.

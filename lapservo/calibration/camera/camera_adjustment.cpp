@@ -7,10 +7,10 @@
 #include <cstddef>
 #include <utility>
 
-#include "lapservo/calibration/fit/departures.h"
 #include "lapservo/calibration/fit/linear_fit.h"
 #include "lapservo/calibration/fit/robust_scale.h"
 #include "lapservo/calibration/fit/solve_quietly.h"
+#include "lapservo/core/departures.h"
 #include "lapservo/geometry/rotation.h"
 
 namespace lapservo::internal {
@@ -288,14 +288,13 @@ std::optional<CameraAdjustment> adjust_camera(const Camera& start, const std::ve
     fitted.add(block);
   for (ViewUnknowns& view : view_unknowns) fitted.add(view.pose.data()), fitted.add(view.wider_px.data());
   result.noise = robust_scale(std::move(in_sigmas));
-  const Departures departures = departures_at(problem, fitted, costs, camera, view_unknowns, start.height_px);
-  const auto possible = possible_faults(views.size());
-  for (const Fault& fault : departures.seen) {
-    result.faults.push_back(possible[fault.which]);
-    result.faults.back().size = fault.size;
+  Eigen::MatrixXd by_faults = Eigen::MatrixXd::Zero(fitted.size(), fitted.size());
+  if (freedom.faults) {
+    const Departures departures = departures_at(problem, fitted, costs, camera, view_unknowns, start.height_px);
+    result.faults = seen_of(departures, possible_faults(views.size()));
+    by_faults = departures.by_seen + departures.by_instead;
   }
-  const auto sigmas =
-      sigmas_of(problem, camera, std::max(1.0, result.noise), fitted, departures.by_seen + departures.by_instead);
+  const auto sigmas = sigmas_of(problem, camera, std::max(1.0, result.noise), fitted, by_faults);
   if (!sigmas) return std::nullopt;
   result.sigmas = sigmas->camera, result.sigma_aspect = sigmas->aspect;
   return result;

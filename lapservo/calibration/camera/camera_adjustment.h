@@ -24,6 +24,7 @@ struct EdgePoint {
 /// The free parameters of the camera; otherwise k3 is 0, and fy is fx.
 struct CameraFreedom {
   bool k3 = true, aspect = true;
+  bool faults = true;  ///< to be looked for
 };
 
 /// A fault that the model of one camera and one flat board leaves out.

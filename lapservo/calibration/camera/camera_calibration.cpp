@@ -9,6 +9,7 @@
 #include <opencv2/calib3d.hpp>
 
 #include "lapservo/calibration/camera/board_edges.h"
+#include "lapservo/calibration/fit/some_of.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/core/rounded_sigma.h"
 #include "lapservo/core/statistics.h"
@@ -125,30 +126,17 @@ MeasuredEdges measured(const Board& board, const std::vector<BoardView>& views, 
   return result;
 }
 
-// More of them add no information.
-std::vector<BoardEdgeProfile> some_of(std::vector<BoardEdgeProfile> profiles, std::size_t most) {
-  if (profiles.size() <= most) return profiles;
-  std::vector<BoardEdgeProfile> some;
-  for (std::size_t i = 0; i < most; ++i) some.push_back(std::move(profiles[i * profiles.size() / most]));
-  return some;
-}
-
-struct Refined {
-  LensFit fit;
-  CameraAdjustment adjustment;
-};
-
 // Unobservable parameters stay zero: k3, and pixels that are not square.
 std::optional<CameraAdjustment> adjust_what_shows(const LensFit& fit, const MeasuredEdges& edges,
                                                   const AtIteration& at_iteration) {
-  CameraFreedom freedom;
-  auto all = adjust_camera(fit.camera, fit.camera_from_board, edges.points, freedom, at_iteration);
+  CameraFreedom freedom{.faults = false};
+  const auto all = adjust_camera(fit.camera, fit.camera_from_board, edges.points, freedom, at_iteration);
   if (!all) return std::nullopt;
   const Camera& camera = all->camera;
   freedom.k3 = std::abs(camera.distortion[4]) > significant_sigmas * all->sigmas.distortion[4];
   freedom.aspect =
       std::abs(camera.fy_px / camera.fx_px - 1) > std::max(square_pixels, significant_sigmas * all->sigma_aspect);
-  if (freedom.k3 && freedom.aspect) return all;
+  freedom.faults = true;
   return adjust_camera(camera, all->camera_from_board, edges.points, freedom, at_iteration);
 }
 
@@ -345,10 +333,11 @@ CameraCalibration calibrate_camera(const Board& board, const std::vector<BoardVi
 
   // Edges about the fit, and the fit about the edges.
   std::optional<CameraAdjustment> adjustment;
-  for (int round = 0; round < 2; ++round) {
+  constexpr int last_round = 1;
+  for (int round = 0; round <= last_round; ++round) {
     told("edges in green");
     adjustment = adjust_camera(fit->camera, fit->camera_from_board, measured(board, views, *fit, false, false).points,
-                               {false, true}, at_iteration);
+                               {.k3 = false, .faults = round == last_round}, at_iteration);
     if (!adjustment) return refuse("the views are too alike to determine the camera");
     fit = fit_of(*adjustment);
   }
@@ -358,6 +347,7 @@ CameraCalibration calibrate_camera(const Board& board, const std::vector<BoardVi
   for (int round = 0; round < response_rounds; ++round) {
     told("response");
     const bool last = round + 1 == response_rounds;
+    // More of them add no information.
     const auto response = fit_response(some_of(measured(board, views, *fit, false, true).profiles, last ? 600 : 300),
                                        fit->camera.response, last, at_iteration);
     if (!response) break;

@@ -21,9 +21,10 @@ namespace {
 // Smaller faults than these are not taken out of the others: they would widen them for nothing.
 constexpr double least_focal = 2e-3, least_drift_m = 0.5e-3, least_drift_rad = 2e-3;
 
+// The first of the faults that are fitted.
 Told focal_of(const ArmFit& f) {
-  const Block& focal = f.model.blocks().focal;
-  return {focal.of(f.fit.x).norm(), std::sqrt(focal.of(f.covariance).trace())};
+  const Eigen::Index focal = f.model.blocks().joints.first;
+  return {std::abs(f.fit.x[focal]), std::sqrt(f.covariance(focal, focal))};
 }
 
 // By how much the marker in the middle of its work moves in the camera over the recording.
@@ -102,12 +103,13 @@ ArmCheck check_arm(const Instrument& instrument, const Camera& camera, const std
     return check.refusal = fault.empty() ? start.refusal : fault, check;
   }
   check.region = ranges_text(*instrument.joints, start.ranges);
-  const auto full = fit_arm(instrument, start, recording, {true, true});
+  const std::vector<JointFault> focal{focal_fault()};
+  const auto full = fit_arm(instrument, start, recording, {true, focal});
   if (!full) return check.refusal = std::string("the motion leaves the registration open: ") + swing_more, check;
   check.focal = focal_of(*full);
   check.drift_m = drift_of_place(*full), check.drift_rad = drift_of_directions(*full);
-  const ArmFaults there{check.focal.exceeds(least_focal),
-                        check.drift_m.exceeds(least_drift_m) || check.drift_rad.exceeds(least_drift_rad)};
+  const ArmFaults there{check.drift_m.exceeds(least_drift_m) || check.drift_rad.exceeds(least_drift_rad),
+                        check.focal.exceeds(least_focal) ? focal : std::vector<JointFault>{}};
   const auto best = fit_arm(instrument, start, recording, there);
   if (!best) return check.refusal = std::string("the motion leaves the registration open: ") + swing_more, check;
 

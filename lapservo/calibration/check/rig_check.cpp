@@ -141,7 +141,10 @@ class Advisor {
 
   void print() {
     const PrintCheck print = f_.print.value_or(PrintCheck{});
-    if (f_.print && print.refusal.empty() && print.psi_rad.exceeds(rig_limits.print_rad))
+    if (!print.contradiction.empty())
+      add(true, "the frames do not show one print: " + print.contradiction, "mend that, and record again",
+          "a print 0.1 mm off costs tens of mrad of psi");
+    else if (f_.print && print.refusal.empty() && print.psi_rad.exceeds(rig_limits.print_rad))
       add(true,
           fmt::format("the print is not the rig's: its boundaries lie {:.2f} px off, psi is {:.0f} mrad rms off",
                       print.before_px, 1e3 * print.psi_rad.value),
@@ -263,9 +266,13 @@ class Advisor {
 PrintCheck check_print(const Rig& rig, std::size_t instrument, std::vector<KeyFrame> frames) {
   PrintCheck check;
   MarkerCalibration calibration = calibrate_marker(rig, instrument, std::move(frames));
-  if (!calibration.refusal.empty()) return check.refusal = calibration.refusal, check;
+  check.refusal = calibration.refusal;
+  if (calibration.contradicts) check.contradiction = calibration.refusal;
+  if (!check.refusal.empty()) return check;
   check.before_px = calibration.before_px, check.after_px = calibration.after_px;
   check.psi_rad = psi_by_print(rig.instruments[instrument].marker, calibration.marker);
+  if (!calibration.faults.empty() && check.psi_rad.sigma > rig_limits.print_rad)
+    check.contradiction = calibration.faults.front();
   check.measured = calibration.marker;
   check.residuals = std::move(calibration.before);
   return check;

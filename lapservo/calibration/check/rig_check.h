@@ -16,6 +16,7 @@ namespace lapservo::internal {
 /// The check of a print by a recording. Empty refusal: all of it is valid.
 struct PrintCheck {
   std::string refusal;
+  std::string contradiction;           ///< why the frames are not those of one print; empty where they are
   double before_px = 0, after_px = 0;  ///< boundaries about the rig's print, and about the one that fits best
   Told psi_rad;                        ///< rms over the turn of what the rig's print makes of psi
   std::optional<Marker> measured;

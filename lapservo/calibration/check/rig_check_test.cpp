@@ -38,8 +38,8 @@ const Rig& true_rig() {
   return rig;
 }
 
-std::vector<cv::Mat> rendered(int count, const RenderOptions& options, double phi_rad = phi_swing_rad) {
-  const Rig& rig = true_rig();
+std::vector<cv::Mat> rendered(int count, const RenderOptions& options, double phi_rad = phi_swing_rad,
+                              const Rig& rig = true_rig()) {
   Renderer renderer(rig.camera, shafts_of(rig), make_tissue(rig.camera.width_px, rig.camera.height_px, 5), options);
   std::vector<cv::Mat> pictures;
   for (int i = 0; i < count; ++i)
@@ -200,6 +200,21 @@ TEST_F(CheckRig, NamesAWrongDelayFirst) {
 TEST_F(CheckRig, NamesAPrintThatIsOffFirst) {
   instrument.marker.bands_upper_m[0] += 0.2e-3, instrument.marker.bands_upper_m[1] -= 0.2e-3;
   expect_first(found_out(rig, pictures(), joints, true), "the print is not the rig's");
+}
+
+// One edge slips in the midst of the recording.
+TEST_F(CheckRig, CallsNoRigGoodWhosePrintSlips) {
+  Rig slipped = rig;
+  for (double& lower_m : slipped.instruments[0].marker.bands_lower_m) lower_m += 0.4e-3;
+  std::vector<cv::Mat> both = rendered(frames, {}, phi_swing_rad, slipped);
+  std::copy_n(pictures().begin(), frames / 2, both.begin());
+  KeyFrames keys(rig, 0);
+  for (std::size_t i = 0; i < both.size(); ++i) keys.add(both[i], static_cast<double>(i) / fps);
+  RigFindings findings;
+  findings.light = MarkerLight{.value = 200, .chroma = 100};
+  findings.registered = true, findings.width_px = 100;
+  findings.print = check_print(rig, 0, keys.take());
+  expect_first(findings, "the print slips");
 }
 
 TEST_F(CheckRig, NamesDriftFirst) {

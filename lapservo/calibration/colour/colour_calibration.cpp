@@ -10,6 +10,7 @@
 #include "lapservo/calibration/colour/band_samples.h"
 #include "lapservo/calibration/colour/marker_response.h"
 #include "lapservo/calibration/fit/robust_scale.h"
+#include "lapservo/core/departures.h"
 #include "lapservo/core/statistics.h"
 #include "lapservo/vision/colour/colour_classes.h"
 #include "lapservo/vision/tracker.h"
@@ -22,7 +23,10 @@ constexpr double reach_deg = 65;        // between an ink's hue and the rig's
 constexpr double least_apart_deg = 40;  // between two bands: nearer, and each keeps no room for light and shade
 constexpr double max_clipped = 0.3;     // of the marker's pixels: their hues are the sensor's, not the ink's
 constexpr double least_move_m = 1.5e-3, least_turn_rad = 0.5;  // of the marker, rms: either
+constexpr double least_fault_deg = 2;                          // smaller ones are not worth a word
 constexpr double hue_floor_deg = 0.5;                          // light, shade and white balance of the day
+constexpr double max_sigma_deg = 12;                           // the largest that may be written
+constexpr int frames_alike = 4;                                // whose light and place err alike
 
 Rig with_hues(Rig rig, std::size_t instrument, const std::array<double, 3>& hues_deg) {
   // A print or a registration that are off are not to hide the marker.
@@ -99,8 +103,65 @@ std::array<double, 3> best_start(const Rig& rig, std::size_t instrument, const s
   return best;
 }
 
+// Hues of one frame beyond the marker's, and its brightness.
+struct FrameHues {
+  std::array<double, 3> beyond_deg;
+  double value;
+};
+
+// How the hues depart from one number each; the variances count that.
+struct HueFaults {
+  std::array<double, 3> variance_deg2{};
+  std::vector<std::string> texts;
+};
+
+// Over the time and with the brightness, the range of each between -1/2 and 1/2. A hue lies as far from the middle of
+// the time as at other times, rms, so that its sigma counts the motion.
+HueFaults hue_faults(const std::vector<FrameHues>& frames, const std::array<double, 3>& middle_deg) {
+  const auto rows = 3 * static_cast<Eigen::Index>(frames.size());
+  const auto [darkest, brightest] = std::minmax_element(
+      frames.begin(), frames.end(), [](const FrameHues& a, const FrameHues& b) { return a.value < b.value; });
+  LinearFit fit;
+  fit.alike_groups = frames_alike, fit.residuals.resize(rows);
+  Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(rows, 3), slopes = Eigen::MatrixXd::Zero(rows, 6);
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const double time = (static_cast<double>(i) + 0.5) / static_cast<double>(frames.size()) - 0.5 - 1 / std::sqrt(12.0);
+    const double light =
+        (frames[i].value - (darkest->value + brightest->value) / 2) / std::max(1.0, brightest->value - darkest->value);
+    fit.groups.push_back(3 * static_cast<Eigen::Index>(i));
+    for (Eigen::Index band = 0; band < 3; ++band) {
+      const Eigen::Index row = fit.groups.back() + band;
+      fit.residuals[row] =
+          middle_deg[static_cast<std::size_t>(band)] - frames[i].beyond_deg[static_cast<std::size_t>(band)];
+      jacobian(row, band) = 1, slopes(row, band) = time, slopes(row, 3 + band) = light;
+    }
+  }
+  fit.groups.push_back(rows), fit.jacobian = jacobian.sparseView();
+  const Departures departures = departures_of(fit, slopes);
+  HueFaults result;
+  for (std::size_t band = 0; band < 3; ++band) {
+    const auto k = static_cast<Eigen::Index>(band);
+    result.variance_deg2[band] = departures.by_seen(k, k) + departures.by_instead(k, k);
+  }
+  std::array<double, 2> most_deg{};  // over the time, with the brightness
+  for (const Fault& fault : departures.seen)
+    most_deg[fault.which / 3] = std::max(most_deg[fault.which / 3], std::abs(fault.size));
+  if (most_deg[0] > least_fault_deg)
+    result.texts.push_back(
+        fmt::format("the hues move by {:.1f} degrees over the recording: fix the white balance, let the light warm up",
+                    most_deg[0]));
+  if (most_deg[1] > least_fault_deg)
+    result.texts.push_back(
+        fmt::format("the hues change by {:.1f} degrees from the darkest frame to the brightest: fix the exposure, "
+                    "switch other lights "
+                    "off",
+                    most_deg[1]));
+  return result;
+}
+
 struct MeasuredHues {
   std::array<double, 3> hues_deg{}, sigma_deg{};
+  std::vector<std::string> faults;
   int found = 0;
   double clipped = 0, moved_m = 0, turned_rad = 0;
 };
@@ -110,7 +171,7 @@ MeasuredHues measure(const Rig& rig, std::size_t instrument, const std::vector<c
                      MarkerResponse* response) {
   const Marker& marker = rig.instruments[instrument].marker;
   Tracker tracker(rig, {.single = true});
-  std::array<std::vector<double>, 3> beyond_deg;
+  std::vector<FrameHues> hues;
   std::vector<double> clipped;
   std::vector<Eigen::Vector3d> places;
   Eigen::Vector2d turn = Eigen::Vector2d::Zero();  // sum of its directions
@@ -127,20 +188,26 @@ MeasuredHues measure(const Rig& rig, std::size_t instrument, const std::vector<c
     if (samples.empty()) continue;
     const MarkerLight light = light_of(samples, marker);
     clipped.push_back(light.clipped);
-    for (std::size_t band = 0; band < 3; ++band)
-      beyond_deg[band].push_back(light.hues_deg[band] - marker.hues_deg[band]);
+    auto& beyond_deg = hues.emplace_back(FrameHues{light.hues_deg, light.value}).beyond_deg;
+    for (std::size_t band = 0; band < 3; ++band) beyond_deg[band] -= marker.hues_deg[band];
   }
   measured.hues_deg = marker.hues_deg;
   if (clipped.empty()) return measured;
   measured.clipped = median(clipped);
+  std::array<double, 3> middle_deg, scatter_deg;
   for (std::size_t band = 0; band < 3; ++band) {
-    const double middle = median(std::vector(beyond_deg[band]));
-    measured.hues_deg[band] = std::fmod(marker.hues_deg[band] + middle + 360, 360.0);
-    for (double& beyond : beyond_deg[band]) beyond -= middle;
-    // Frames are not independent: what changes with light and place stays alike over several.
-    const double scatter = robust_scale(beyond_deg[band]) / std::sqrt(static_cast<double>(clipped.size()) / 4);
-    measured.sigma_deg[band] = std::hypot(hue_floor_deg, scatter);
+    std::vector<double> beyond_deg;
+    for (const FrameHues& frame : hues) beyond_deg.push_back(frame.beyond_deg[band]);
+    middle_deg[band] = median(std::vector(beyond_deg));
+    measured.hues_deg[band] = std::fmod(marker.hues_deg[band] + middle_deg[band] + 360, 360.0);
+    for (double& beyond : beyond_deg) beyond -= middle_deg[band];
+    scatter_deg[band] = robust_scale(beyond_deg) / std::sqrt(static_cast<double>(hues.size()) / frames_alike);
   }
+  const HueFaults faults = hue_faults(hues, middle_deg);
+  measured.faults = faults.texts;
+  for (std::size_t band = 0; band < 3; ++band)
+    measured.sigma_deg[band] =
+        std::sqrt(hue_floor_deg * hue_floor_deg + std::pow(scatter_deg[band], 2) + faults.variance_deg2[band]);
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   for (const auto& place : places) mean += place / static_cast<double>(places.size());
   double squares = 0;
@@ -173,6 +240,9 @@ std::string refusal_of(const MeasuredHues& measured, std::size_t frames, const s
         "two bands' hues are {:.0f} degrees apart, at least {:.0f} are needed: print with other inks, or "
         "look at the white balance",
         apart_deg, least_apart_deg);
+  if (*std::max_element(measured.sigma_deg.begin(), measured.sigma_deg.end()) > max_sigma_deg)
+    return "the hues are not those of one light: " +
+           (measured.faults.empty() ? "they scatter from frame to frame; light the marker evenly" : measured.faults[0]);
   return {};
 }
 
@@ -215,6 +285,7 @@ ColourCalibration calibrate_colour(const Rig& rig, std::size_t instrument, const
   calibration.refusal = refusal_of(measured, frames.size(), of.name);
   if (!calibration.refusal.empty()) return calibration;
   calibration.hues_deg = hues_deg, calibration.sigma_hues_deg = measured.sigma_deg;
+  calibration.faults = measured.faults;
   say("the response");
   if (const auto result = response.result()) {
     if (!keep_response) calibration.response = result->better;
@@ -229,6 +300,13 @@ ColourCalibration calibrate_colour(const Rig& rig, std::size_t instrument, const
                           result->name, result->edges, result->after_px, result->before_px)
             : fmt::format("as it is: no usual one brings channels nearer at {} edges, they lie {:.3f} px apart",
                           result->edges, result->before_px);
+    constexpr double seen_sigmas = 3, least_px = 0.02;
+    if (std::abs(result->left_px) > std::max(least_px, seen_sigmas * result->sigma_left_px))
+      calibration.response_found += fmt::format(
+          "; no usual one explains the edges, {:.3f} px are left beyond their noise: switch the camera's sharpening "
+          "off, "
+          "or lapservo calibrate camera",
+          std::abs(result->left_px));
   } else {
     calibration.response_found = "as it is: too few edges; come nearer";
   }

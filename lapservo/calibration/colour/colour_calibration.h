@@ -32,7 +32,8 @@ struct ColourCalibration {
   std::array<double, 3> hues_deg{}, sigma_hues_deg{};  ///< [0, 360); one standard deviation each
   std::optional<Response> response;                    ///< another than the rig's, when the frames say so
   std::string response_found;                          ///< what they say, in words
-  int found_before = 0, found = 0;                     ///< of the frames
+  std::vector<std::string> faults;  ///< of the frames' colours, that show beyond the noise: the sigmas count them
+  int found_before = 0, found = 0;  ///< of the frames
 };
 
 /// The hues of a mounted marker's bands as the camera has them, and how it encodes light, from frames of it in motion

@@ -1,6 +1,7 @@
 #include "lapservo/calibration/colour/colour_calibration.h"
 
 #include <cmath>
+#include <cstdio>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -93,6 +94,16 @@ TEST_F(CalibrateColour, TellsAnotherResponse) {
   EXPECT_NE(kept.response_found.find("the marker alone says gamma:1.8"), std::string::npos) << kept.response_found;
 }
 
+// 1.4 and 1.6 lie between those that it tries.
+TEST_F(CalibrateColour, NamesAResponseThatIsNoUsualOne) {
+  for (const auto& [gamma, is_usual] : {std::pair(1.4, false), {1.6, false}, {1.8, true}, {2.2, true}}) {
+    real.camera.response = {Response::Kind::power, gamma};
+    const std::string found = calibrate_colour(rig, 0, filmed(real, {})).response_found;
+    std::printf("  gamma %.1f: %s\n", gamma, found.c_str());
+    EXPECT_EQ(found.find("no usual one explains") == std::string::npos, is_usual) << found;
+  }
+}
+
 TEST_F(CalibrateColour, RefusesWhatCanNotTell) {
   const auto refusal = [&](const Film& film) { return calibrate_colour(rig, 0, filmed(real, film)).refusal; };
   EXPECT_NE(refusal({.frames = 5}).find("at least"), std::string::npos);
@@ -100,6 +111,39 @@ TEST_F(CalibrateColour, RefusesWhatCanNotTell) {
   EXPECT_NE(refusal({.frames = 10, .light = 6}).find("lower the exposure"), std::string::npos);
   const std::vector<cv::Mat> nothing(10, scenes::render_nothing(rig, 3));
   EXPECT_NE(calibrate_colour(rig, 0, nothing).refusal.find("0 of 10 frames"), std::string::npos);
+}
+
+// A white balance that moves over the recording, or light that changes its colour as it dims: refused, or named with
+// sigmas that hold.
+TEST_F(CalibrateColour, NamesHuesThatAreNotOne) {
+  const auto frames = filmed(real, {});
+  const auto found_with = [&](double by, bool over_time) {
+    std::vector<cv::Mat> tinted(frames.size());
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      const double part = over_time ? static_cast<double>(i) / static_cast<double>(frames.size()) - 0.5
+                                    : 0.5 * std::sin(1.7 * static_cast<double>(i));
+      const double all = over_time ? 1 : 1 + 0.4 * part;
+      cv::multiply(frames[i], cv::Scalar(all * (1 - by * part), all, all * (1 + by * part)), tinted[i]);
+    }
+    return calibrate_colour(rig, 0, tinted);
+  };
+  for (const bool over_time : {true, false})
+    for (const double by : {0.0, 0.05, 0.2, 0.6}) {
+      const auto found = found_with(by, over_time);
+      double worst = 0;
+      for (std::size_t band = 0; band < 3 && found.refusal.empty(); ++band)
+        worst = std::max(worst, hue_gap_deg(found.hues_deg[band], real.instruments[0].marker.hues_deg[band]) /
+                                    found.sigma_hues_deg[band]);
+      const std::string said = found.refusal + (found.faults.empty() ? "" : found.faults[0]);
+      std::printf("  %s by %.2f: error / sigma up to %.2f, %s\n", over_time ? "over time" : "with light", by, worst,
+                  said.c_str());
+      EXPECT_LT(worst, 4);
+      EXPECT_TRUE(by > 0 || said.empty()) << said;
+      if (by == 0.2) {
+        EXPECT_NE(said.find(over_time ? "over the recording" : "to the brightest"), std::string::npos) << said;
+      }
+      EXPECT_TRUE(by < 0.6 || !over_time || !found.refusal.empty());
+    }
 }
 
 TEST_F(CalibrateColour, KeepsSomeOfManyFrames) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include "lapservo/calibration/fit/robust_scale.h"
 #include "lapservo/core/statistics.h"
@@ -102,6 +103,12 @@ double disagreement_px(const EdgeProfile& profile) {
   return rise > 0 && fall > 0 ? rising / rise - falling / fall : std::nan("");
 }
 
+// Neighbouring lines share pixels.
+double sigma_of_median(std::vector<double> values, double median) {
+  for (double& value : values) value -= median;
+  return 3 * robust_scale(values) / std::sqrt(static_cast<double>(values.size()));
+}
+
 double typical_px(std::vector<double> apart_px) {
   for (double& apart : apart_px) apart = std::abs(apart);
   return median(apart_px);
@@ -140,18 +147,19 @@ void MarkerResponse::add(const cv::Mat& bgr, const Marker& marker, const ShaftPo
 std::optional<MarkerResponse::Result> MarkerResponse::result() const {
   const std::vector<double>& own = candidates_.front().apart_px;
   if (own.size() < least_edges) return std::nullopt;
-  Result result{{}, candidates_.front().name, typical_px(own), typical_px(own), own.size()};
+  Result result{{}, candidates_.front().name, typical_px(own), typical_px(own), 0, 0, own.size()};
+  const Candidate* best = &candidates_.front();
   for (const Candidate& candidate : candidates_) {
     // Gains edge by edge: a property of one edge (specular light, a drop) is common to both.
     std::vector<double> gains;
     for (std::size_t i = 0; i < own.size(); ++i) gains.push_back(std::abs(own[i]) - std::abs(candidate.apart_px[i]));
     const double gain_px = median(std::vector(gains)), now_px = typical_px(candidate.apart_px);
-    for (double& gain : gains) gain -= gain_px;
-    // Neighbouring lines share pixels.
-    const double sigma_px = 3 * robust_scale(gains) / std::sqrt(static_cast<double>(gains.size()));
+    const double sigma_px = sigma_of_median(std::move(gains), gain_px);
     if (now_px < result.after_px && gain_px > std::max(least_gain_px, least_sigmas * sigma_px))
-      result.after_px = now_px, result.name = candidate.name, result.better = candidate.response;
+      result.after_px = now_px, result.name = candidate.name, result.better = candidate.response, best = &candidate;
   }
+  result.left_px = median(std::vector(best->apart_px));
+  result.sigma_left_px = sigma_of_median(best->apart_px, result.left_px);
   return result;
 }
 

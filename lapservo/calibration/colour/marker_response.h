@@ -30,6 +30,9 @@ class MarkerResponse {
     /// Between the edges of channels that rise and of those that fall at one place: medians, with the camera's own
     /// response and with the best.
     double before_px = 0, after_px = 0;
+    /// Median with its sign of that distance with the best, and its standard deviation: beyond it, none of them
+    /// explains the edges.
+    double left_px = 0, sigma_left_px = 0;
     std::size_t edges = 0;
   };
   /// Nullopt with too few edges.

@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "lapservo/calibration/fit/departures.h"
+#include "lapservo/core/departures.h"
 
 namespace lapservo::internal {
 
@@ -19,6 +19,7 @@ class FittedNumbers {
   /// Its first column; nullopt where it is not fitted.
   std::optional<Eigen::Index> column(const double* block) const;
   const std::vector<double*>& blocks() const { return blocks_; }
+  Eigen::Index size() const { return size_; }
 
  private:
   const ceres::Problem& problem_;

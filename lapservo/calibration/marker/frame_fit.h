@@ -8,7 +8,7 @@
 #include <Eigen/Core>
 
 #include "lapservo/calibration/fit/at_iteration.h"
-#include "lapservo/calibration/fit/departures.h"
+#include "lapservo/core/departures.h"
 
 namespace lapservo::internal {
 

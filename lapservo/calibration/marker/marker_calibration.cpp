@@ -257,7 +257,7 @@ std::vector<std::string> texts_of(const std::vector<PrintFault>& faults) {
                       ? "the print slips by %.3f mm about %.0f s after the start: fasten it and "
                         "record again"
                       : "a boundary of the print bows by %.3f mm between its ends: print and cut it straight",
-                  1e3 * std::abs(fault.size_m), fault.from_s);
+                  1e3 * std::abs(fault.size), fault.from_s);
     texts.emplace_back(text);
   }
   return texts;
@@ -285,9 +285,9 @@ ResidualSummary summary_of(const Adjustment& adjustment, const std::vector<ViewM
   return summary;
 }
 
-MarkerCalibration refused(std::string why) {
+MarkerCalibration refused(std::string why, bool contradicts = false) {
   MarkerCalibration calibration;
-  calibration.refusal = std::move(why);
+  calibration.refusal = std::move(why), calibration.contradicts = contradicts;
   return calibration;
 }
 
@@ -343,7 +343,7 @@ MarkerCalibration calibrate_marker(const Rig& rig, std::size_t instrument, std::
   constexpr double max_before_px = 20;
   auto before = fit.round(rounds[0], false);
   if (before) before = fit.round(rounds[0], false);
-  if (!before) return refused(unsolvable);
+  if (!before) return refused(unsolvable, true);
   const ResidualSummary residuals_before = summary_of(*before, fit.measured(), nominal, max_before_px);
   calibration.before_px = residuals_before.rms_px, calibration.before = residuals_before.residuals;
 
@@ -354,10 +354,10 @@ MarkerCalibration calibrate_marker(const Rig& rig, std::size_t instrument, std::
     if (progress) progress(i, max_rounds);
     const auto stage = std::min(static_cast<std::size_t>(i), rounds.size() - 1);
     last = fit.round(rounds[stage], true, stage + 1 == rounds.size());
-    if (!last) return refused(unsolvable);
+    if (!last) return refused(unsolvable, true);
     if (i == 2) fit.judge_video();
     if (i >= 2) fit.drop_misfits(*last);
-    if (fit.frames().size() < min_turn_frames) return refused(unsolvable);
+    if (fit.frames().size() < min_turn_frames) return refused(unsolvable, true);
     settled = last->covariance && is_settled(*last, nominal.radius_m());
     if (gap_judged || !(settled || i == gap_round)) continue;
     // A gap that is insignificant counts as none: then the print's ends meet in one edge.
@@ -369,7 +369,7 @@ MarkerCalibration calibrate_marker(const Rig& rig, std::size_t instrument, std::
     fit.believe_no_gap(), settled = false;
   }
   last = fit.round(rounds.back(), true, true);
-  if (!last) return refused(unsolvable);
+  if (!last) return refused(unsolvable, true);
   if (const std::string why = blur_refusal(fit.frames(), nominal); !why.empty()) return refused(why);
   calibration.seam_views = seam_views(fit.measured());
   calibration.seam_may_lag = last->lags;
@@ -389,7 +389,8 @@ MarkerCalibration calibrate_marker(const Rig& rig, std::size_t instrument, std::
     std::snprintf(text, sizeof text,
                   "its boundaries would be known to %.2f mm only: ", 1e3 * calibration.marker.tolerance_m);
     return refused(
-        text + (calibration.faults.empty() ? "turn it more slowly, nearer and sharper" : calibration.faults.front()));
+        text + (calibration.faults.empty() ? "turn it more slowly, nearer and sharper" : calibration.faults.front()),
+        !calibration.faults.empty());
   }
   if (const auto problem = marker_problem(calibration.marker))
     return refused("what was found is no marker: " + problem->text());

@@ -50,8 +50,9 @@ struct PrintResidual {
 };
 
 struct MarkerCalibration {
-  /// Why there is none, and what to do about it: then nothing else counts. Empty when there is one.
+  /// Why there is none, and what to do about it: then `contradicts` alone counts. Empty when there is one.
   std::string refusal;
+  bool contradicts = false;    ///< the frames are not those of one print: more of them do not help
   Marker marker;               ///< with its sigmas; tolerance_m is what they leave
   std::size_t frames = 0;      ///< that were used
   std::size_t seam_views = 0;  ///< of them, those that show the seam

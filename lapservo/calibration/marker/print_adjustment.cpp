@@ -312,10 +312,7 @@ PrintDepartures departures_at(ceres::Problem& problem, const std::vector<ViewMea
     }
   const Departures departures = departures_of(fit, slopes);
   PrintDepartures result;
-  for (const Fault& fault : departures.seen) {
-    result.faults.push_back(possible[fault.which]);
-    result.faults.back().size_m = fault.size;
-  }
+  result.faults = seen_of(departures, possible);
   if (departures.seen.empty()) return result;
   const Eigen::MatrixXd covariance = departures.by_seen + departures.by_instead;
   for (Eigen::Index i = 0; i < print_numbers; ++i)

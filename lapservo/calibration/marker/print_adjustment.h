@@ -13,7 +13,7 @@ namespace lapservo::internal {
 struct PrintFault {
   enum class Kind { slips, curved } kind;
   double from_s = 0;  ///< of the first: from when on one edge lies elsewhere along the shaft
-  double size_m = 0;  ///< by how much; of the second, how far an edge's middle lies beyond the line of its ends
+  double size = 0;    ///< m: by how much; of the second, how far an edge's middle lies beyond the line of its ends
 };
 
 struct AdjustmentOptions {

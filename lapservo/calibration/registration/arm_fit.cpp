@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "lapservo/calibration/fit/some_of.h"
 #include "lapservo/core/error.h"
 #include "lapservo/core/statistics.h"
 
@@ -38,14 +39,6 @@ std::optional<ModelFit> fit_model(const Instrument& instrument, const ArmStart& 
   return ModelFit{std::move(model), std::move(*fit)};
 }
 
-// More of them explain nothing better.
-std::vector<TimedPose> some_of(const std::vector<TimedPose>& poses) {
-  constexpr std::size_t enough = 120;
-  std::vector<TimedPose> some;
-  for (std::size_t i = 0; i < poses.size(); i += 1 + poses.size() / enough) some.push_back(poses[i]);
-  return some;
-}
-
 // The noise that a fault leaves, and the fault in words.
 struct Explanation {
   Eigen::VectorXd noise;
@@ -60,7 +53,7 @@ class Explainer {
   Explainer(const Instrument& instrument, const std::vector<TimedPose>& poses, const JointRecording& recording,
             const std::string& source, const AtIteration& at_iteration)
       : instrument_(instrument),
-        poses_(some_of(poses)),
+        poses_(some_of(poses, enough)),
         recording_(recording),
         source_(source),
         at_iteration_(at_iteration) {}
@@ -80,6 +73,8 @@ class Explainer {
   const std::optional<Explanation>& best() const { return best_; }
 
  private:
+  static constexpr std::size_t enough = 120;  // poses: more of them explain nothing better
+
   std::optional<ModelFit> fit_to(const std::vector<TimedPose>& poses, const JointRecording& recording,
                                  const ArmFaults& free) const {
     try {
@@ -121,7 +116,8 @@ std::vector<JointFault> possible_faults(const Joints& joints, const std::vector<
 std::optional<ArmFit> fit_arm(const Instrument& instrument, const ArmStart& start, const JointRecording& recording,
                               const ArmFaults& free, const AtIteration& at_iteration) {
   auto faults = sized_joint_faults(instrument.joints.value(), start.poses);
-  if (free.focal) std::erase_if(faults, [](const JointFault& fault) { return !fault.mend; });
+  const auto is_focal = [](const JointFault& fault) { return !fault.mend; };
+  if (std::any_of(free.joints.begin(), free.joints.end(), is_focal)) std::erase_if(faults, is_focal);
   auto fitted = fit_model(instrument, start, recording, free, faults, at_iteration);
   if (!fitted) return std::nullopt;
   ArmFit result{std::move(fitted->model), std::move(fitted->fit), {}, {}, {}};

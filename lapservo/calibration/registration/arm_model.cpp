@@ -37,7 +37,7 @@ void ArmModel::add_unknowns(double delay_s, const ArmFaults& faults) {
   // Compressed video moves the outline by some hundredths of a pixel, and the foreshortened length by more.
   constexpr double scale_prior = 2e-3, tilt_prior_rad = 5e-3;
   // So that what a recording leaves open does not stop the fit: farther off, nothing would have been found.
-  constexpr double focal_prior = 0.3, drift_prior_m = 0.05, drift_prior_rad = 0.5;
+  constexpr double drift_prior_m = 0.05, drift_prior_rad = 0.5;
   constexpr double step_rad = 1e-4, step_m = 1e-5, step_s = 1e-3, step = 1e-4;
   const auto add = [&](const std::vector<Unknown>& added) { return add_block(unknowns_, added); };
   const auto& offset = guess_.joints.offset;
@@ -51,14 +51,13 @@ void ArmModel::add_unknowns(double delay_s, const ArmFaults& faults) {
   std::vector<Unknown> backlash;
   for (const std::size_t joint : moving_) backlash.push_back({0, joint == 2 ? step_m : step_rad});
   blocks_.backlash = add(backlash);
-  if (faults.focal) blocks_.focal = add({{0, step, focal_prior}});
   if (faults.drift) {
     std::vector<Unknown> drift(3, {0, step_m, drift_prior_m});
     drift.insert(drift.end(), 3, {0, step_rad, drift_prior_rad});
     blocks_.drift = add(drift);
   }
   std::vector<Unknown> joints;
-  for (const JointFault& fault : faults.joints) joints.push_back({0, fault.step});
+  for (const JointFault& fault : faults.joints) joints.push_back({0, fault.step, fault.prior});
   blocks_.joints = add(joints);
 }
 
@@ -132,7 +131,7 @@ JointRecording ArmModel::behind_backlash(const Eigen::VectorXd& x) const {
 }
 
 double ArmModel::focal_change(const Eigen::VectorXd& x) const {
-  double change = blocks_.focal.size > 0 ? blocks_.focal.of(x)[0] : 0;
+  double change = 0;
   for (std::size_t k = 0; k < faults_.size(); ++k)
     if (!faults_[k].mend) change += blocks_.joints.of(x)[static_cast<Eigen::Index>(k)];
   return change;

@@ -19,7 +19,6 @@ Eigen::MatrixXd arm_covariance(const FrameFit& fit);
 
 /// Which faults an arm's model may have beside a wrong registration.
 struct ArmFaults {
-  bool focal = false;                ///< the camera's focal length is another: needs TimedPose::by_focal
   bool drift = false;                ///< what the RCM frame moves by in the camera over the recording, steadily
   std::vector<JointFault> joints{};  ///< with a size
 };
@@ -37,8 +36,8 @@ class ArmModel {
     /// view.
     Block scale, tilt;
     Block backlash;  ///< of those joints that move
-    Block focal;     ///< relative change of the focal length; empty without this fault, as the next
-    Block drift;     ///< of the RCM frame from the first pose to the last: place (3, camera frame), turn (3, RCM frame)
+    Block drift;     ///< empty without this fault: of the RCM frame from the first pose to the last: place (3, camera
+                     ///< frame), turn (3, RCM frame)
     Block joints;    ///< sizes of the joints' faults
   };
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include <fmt/format.h>
+
 #include "lapservo/calibration/marker/frame_fit.h"
 #include "lapservo/core/dense_matrix.h"
 
@@ -31,6 +33,45 @@ Eigen::Matrix<double, 2, 3> across(const TimedPose& pose, double reach_m) {
   return directions;
 }
 
+// The numbers of the fit: the point, then the faults that are held at 0. The point lies as far from the middle of the
+// motion as it is there at other times, rms: so its sigma counts the motion.
+constexpr Eigen::Index motion = 3, tilt = 6, bend = 7, numbers = 9;
+
+// The axis' way past the point, as the numbers have both.
+Eigen::Vector2d miss(TimedPose pose, double part_of_time, const Eigen::VectorXd& x) {
+  Rigid3& seen = pose.marker.camera_from_marker;
+  const Eigen::Vector3d hinge = pose.axis().cross(pose.origin()).normalized();
+  const Eigen::Vector3d beside_m = seen.rotation * Eigen::Vector3d(x[bend], x[bend + 1], 0);
+  seen.rotation = Eigen::AngleAxisd(x[tilt], hinge) * seen.rotation;
+  const double time = part_of_time - 0.5 - 1 / std::sqrt(12.0);
+  const Eigen::Vector3d arm_m = pose.origin() + beside_m - (x.head<3>() + time * x.segment<3>(motion));
+  return across(pose, arm_m.norm()) * arm_m;
+}
+
+// Smaller ones are not worth a word.
+std::vector<std::string> texts_of(const std::vector<Fault>& seen) {
+  constexpr double least_m = 0.1e-3, least_rad = 5e-3;
+  Eigen::VectorXd sizes = Eigen::VectorXd::Zero(numbers);
+  for (const Fault& fault : seen) sizes[3 + static_cast<Eigen::Index>(fault.which)] = fault.size;
+  std::vector<std::string> texts;
+  if (const double moved_m = sizes.segment<3>(motion).norm(); moved_m > least_m)
+    texts.push_back(
+        fmt::format("the RCM moves by {:.2g} mm over the recording: fasten the trocar, the endoscope and the arm's "
+                    "base, and record again",
+                    1e3 * moved_m));
+  if (const double beside_m = sizes.segment<2>(bend).norm(); beside_m > least_m)
+    texts.push_back(
+        fmt::format("the shaft's axis passes {:.2g} mm beside the RCM and turns with the shaft: the shaft is bent, or "
+                    "the marker sits askew on it",
+                    1e3 * beside_m));
+  if (std::abs(sizes[tilt]) > least_rad)
+    texts.push_back(fmt::format(
+        "all axes are tilted by {:.0f} mrad along the view: the print is longer or shorter than the rig's: lapservo "
+        "calibrate marker",
+        1e3 * std::abs(sizes[tilt])));
+  return texts;
+}
+
 }  // namespace
 
 std::optional<AxesMeetingPoint> axes_meeting_point(const std::vector<TimedPose>& poses,
@@ -44,20 +85,25 @@ std::optional<AxesMeetingPoint> axes_meeting_point(const std::vector<TimedPose>&
     information += one, sum += one * pose.origin(), mean += pose.axis() / static_cast<double>(poses.size());
   }
   if (!(1 - mean.squaredNorm() > least_spread_rad * least_spread_rad)) return std::nullopt;
+  const double span_s = std::max(1e-9, poses.back().time_s - poses.front().time_s);
   // Each in units of what it is known to where it passes the point: else noise of the axes draws the point near.
   const FrameResiduals misses = [&](const Eigen::VectorXd& x) {
     Eigen::MatrixXd all(2, static_cast<Eigen::Index>(poses.size()));
     for (std::size_t i = 0; i < poses.size(); ++i) {
-      const Eigen::Vector3d arm_m = poses[i].origin() - x;
-      all.col(static_cast<Eigen::Index>(i)) = across(poses[i], arm_m.norm()) * arm_m;
+      const double part = (poses[i].time_s - poses.front().time_s) / span_s;
+      all.col(static_cast<Eigen::Index>(i)) = miss(poses[i], part, x);
     }
     return all;
   };
   const Eigen::Vector3d start_m = solve_symmetric(information, sum);
-  const auto fit = fit_frames(misses, {{start_m.x(), 1e-5}, {start_m.y(), 1e-5}, {start_m.z(), 1e-5}},
-                              poses_per_second(poses), at_iteration);
+  constexpr double step_m = 1e-5, step_rad = 1e-4;
+  std::vector<Unknown> unknowns(numbers, {0, step_m});
+  for (std::size_t i = 0; i < 3; ++i) unknowns[i].start = start_m[static_cast<Eigen::Index>(i)];
+  unknowns[tilt].step = step_rad;
+  const auto fit = fit_frames(misses, unknowns, poses_per_second(poses), at_iteration, numbers - 3);
   if (!fit) return std::nullopt;
-  AxesMeetingPoint result{fit->x, fit->covariance, {}};
+  AxesMeetingPoint result{fit->x, fit->covariance, {}, texts_of(fit->departures.seen), {}};
+  result.by_faults = fit->departures.by_seen + fit->departures.by_instead;
   for (const TimedPose& pose : poses) result.misses_m.push_back(pose.miss_m(result.point_m));
   return result;
 }

@@ -101,17 +101,6 @@ JointFault lost_frames_fault(double from_s) {
           1e-3, least_lost_s};
 }
 
-JointFault focal_fault() {
-  return {[](double longer) {
-            return fmt::format("the rig's focal length is {:.3g} times the camera's: lapservo calibrate camera",
-                               1 / (1 + longer));
-          },
-          {},
-          1e-4,
-          0,
-          {-0.4, -0.2, 0, 0.25, 0.6}};
-}
-
 void unwrap(JointRecording& r) {
   for (std::size_t j = 0; j < 4; ++j) {
     if (is_length(j)) continue;
@@ -134,6 +123,18 @@ void drop_repeated(JointRecording& r) {
 }
 
 }  // namespace
+
+JointFault focal_fault() {
+  return {[](double longer) {
+            return fmt::format("the rig's focal length is {:.3g} times the camera's: lapservo calibrate camera",
+                               1 / (1 + longer));
+          },
+          {},
+          1e-4,
+          0,
+          {-0.4, -0.2, 0, 0.25, 0.6},
+          0.3};
+}
 
 std::vector<JointFault> sized_joint_faults(const Joints& joints, const std::vector<TimedPose>& poses) {
   constexpr int parts = 8;

@@ -20,7 +20,11 @@ struct JointFault {
   double step = 0;                   ///< for derivatives by the size; 0: it is there or not, and has no size
   double least = 0;                  ///< smaller ones are not worth a word
   std::vector<double> starts = {0};  ///< from where a fit of its size may have to begin
+  double prior = 0;                  ///< Unknown::prior of its size
 };
+
+/// Another focal length of the camera than that by which the poses were found.
+JointFault focal_fault();
 
 /// Scales, couplings and times of the joints, the clock, frames that are lost, the focal length: faults with a size, of
 /// which 0 is none.

@@ -176,12 +176,16 @@ Registration register_rcm(const Instrument& instrument, const std::vector<TimedP
   const auto meeting = axes_meeting_point(poses, at_iteration);
   Eigen::Vector3d sigma_m = Eigen::Vector3d::Zero();
   if (meeting) {
-    const Eigen::Matrix3d covariance = unmodelled * meeting->covariance + common_covariance(poses, meeting->point_m);
+    const Eigen::Matrix3d covariance =
+        unmodelled * meeting->covariance + meeting->by_faults + common_covariance(poses, meeting->point_m);
     sigma_m = covariance.diagonal().cwiseMax(0).cwiseSqrt();
   }
-  if (!meeting || sigma_m.norm() > max_sigma_m)
-    return result.refusal = std::string("the shaft's axes are too alike to locate their intersection: ") + swing_more,
-           result;
+  if (!meeting || sigma_m.norm() > max_sigma_m) {
+    result.refusal = meeting && !meeting->faults.empty()
+                         ? "the shaft's axes do not meet in one point: " + meeting->faults.front()
+                         : std::string("the shaft's axes are too alike to locate their intersection: ") + swing_more;
+    return result;
+  }
   std::vector<double> beyond_m;
   for (const TimedPose& pose : poses) beyond_m.push_back(pose.beyond_m(meeting->point_m));
   if (median(beyond_m) < 0) return result.refusal = reversed_marker, result;
@@ -197,6 +201,12 @@ Registration register_rcm(const Instrument& instrument, const std::vector<TimedP
     const double axis_rad = std::asin(std::min(1.0, meeting->misses_m[i] / std::max(1e-6, arm_m.norm())));
     result.residuals.push_back({poses[i].time_s, meeting->misses_m[i], axis_rad, 0});
   }
+  result.faults = meeting->faults;
+  if (const Largest off = largest_residual(result); off.m > max_sigma_m || off.rad > max_sigma_rad)
+    result.refusal = fmt::format(
+        "the shaft's axes miss one another by {:.1f} mm and {:.0f} mrad rms: {}", 1e3 * off.m, 1e3 * off.rad,
+        result.faults.empty() ? "does the endoscope, the trocar or the marker move, is the focal length the camera's"
+                              : result.faults.front());
   return result;
 }
 

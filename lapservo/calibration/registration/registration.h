@@ -43,7 +43,7 @@ struct Registration {
   };
   std::optional<Arm> arm;
 
-  /// Faults of the joints' readings that show beyond the noise, one sentence each: the sigmas count them.
+  /// Faults of the poses and the joints' readings that show beyond the noise, one sentence each: the sigmas count them.
   std::vector<std::string> faults;
   std::vector<std::string> unknown;  ///< quantities that these data do not determine, one sentence each
   std::vector<RegistrationResidual> residuals;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
+#include <functional>
 #include <string>
 #include <utility>
 
@@ -355,6 +357,68 @@ TEST(RegisterRcm, PutsItWhereTheAxesMeet) {
   Motion still;
   still.swing.fill(0.05);
   EXPECT_TRUE(has(register_rcm(recorded(still).truth, recorded(still).poses).refusal, "too alike"));
+}
+
+// A fault of poses by themselves, with a size that is gross.
+struct PoseFault {
+  std::string name, cause;
+  double gross;
+  std::function<void(TimedPose&, double part, double size)> apply;
+};
+
+std::vector<PoseFault> pose_faults() {
+  return {{"the RCM moves [m]", "the RCM moves by", 1e-2,
+           [](TimedPose& pose, double part, double size) {
+             pose.marker.camera_from_marker.translation += (part - 0.5) * size * Eigen::Vector3d(0.6, -0.64, 0.48);
+           }},
+          {"beside the shaft [m]", "beside the RCM and turns", 5e-3,
+           [](TimedPose& pose, double, double size) {
+             Rigid3& seen = pose.marker.camera_from_marker;
+             seen.translation += size * (seen.rotation * Eigen::Vector3d(0.8, 0.6, 0));
+           }},
+          {"tilted [rad]", "along the view", 0.05, [](TimedPose& pose, double, double size) {
+             const Eigen::Vector3d hinge = pose.axis().cross(pose.origin()).normalized();
+             auto& rotation = pose.marker.camera_from_marker.rotation;
+             rotation = Eigen::AngleAxisd(size, hinge) * rotation;
+           }}};
+}
+
+TEST(RegisterRcm, RefusesOrNamesWhatNoPointExplainsAndItsSigmaHolds) {
+  constexpr int seeds = 10;
+  const auto tell = [&](const PoseFault* fault, double size) {
+    int refused = 0, said = 0, named = 0, wrong = 0;
+    double squares = 0;
+    for (int seed = 1; seed <= seeds; ++seed) {
+      Motion motion;
+      motion.seed = 100 + static_cast<std::uint64_t>(seed);
+      Recorded data = recorded(motion);
+      const double span_s = data.poses.back().time_s - data.poses.front().time_s;
+      for (TimedPose& pose : data.poses)
+        if (fault) fault->apply(pose, (pose.time_s - data.poses.front().time_s) / span_s, size);
+      const Registration found = register_rcm(data.truth, data.poses);
+      const std::string words = !found.refusal.empty() ? found.refusal : found.faults.empty() ? "" : found.faults[0];
+      said += !words.empty(), refused += !found.refusal.empty(), named += fault && has(words, fault->cause);
+      if (!found.refusal.empty()) continue;
+      const Eigen::Vector3d off = (found.camera_from_rcm.translation - data.truth.camera_from_rcm->translation)
+                                      .cwiseQuotient(found.sigma_translation_m);
+      squares += off.squaredNorm() / 3, wrong += off.cwiseAbs().maxCoeff() > 4;
+    }
+    const double error = std::sqrt(squares / std::max(1, seeds - refused));
+    std::printf(
+        "  %-21s %7.5f: of %d said %2d, refused %2d, rightly %2d, off by more than 4 sigmas %d, error / sigma %.2f\n",
+        fault ? fault->name.c_str() : "clean", size, seeds, said, refused, named, wrong, error);
+    EXPECT_EQ(wrong, 0);
+    EXPECT_LT(error, 1.4);
+    if (!fault) {
+      EXPECT_EQ(said, 0);
+    } else {
+      EXPECT_GE(named, 0.8 * said) << fault->name;
+      EXPECT_TRUE(size < fault->gross || said == seeds) << fault->name;
+    }
+  };
+  tell(nullptr, 0);
+  for (const PoseFault& fault : pose_faults())
+    for (const double part : {0.01, 0.1, 0.3, 1.0, 3.0}) tell(&fault, part * fault.gross);
 }
 
 }  // namespace

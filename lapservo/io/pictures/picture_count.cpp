@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "lapservo/io/pictures/jpeg_segments.h"
+#include "lapservo/io/pictures/png_chunk.h"
 #include "lapservo/io/tables/numbers.h"
 
 namespace lapservo::internal {
@@ -15,26 +16,16 @@ using namespace std::string_view_literals;
 
 constexpr std::size_t unknown = std::size_t(-1);
 
-std::string_view text_of(Bytes bytes) {
-  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-}
-
 // Images in the first file of `bytes`, and where that ends.
 struct First {
   std::size_t pictures = 1, end = unknown;
 };
 
-// Chunks of a length, a name, content and a checksum.
 First first_png(Bytes bytes) {
-  constexpr std::size_t signature = 8, around = 12;
-  const Numbers numbers{bytes, true};
   First first;
-  for (std::size_t at = signature; at + around <= bytes.size();) {
-    const std::string_view name = text_of(bytes).substr(at + 4, 4);
-    if (name == "acTL") first.pictures = numbers.of(at + 8, 4);
-    at += around + numbers.of(at, 4);
-    if (name == "IEND") first.end = at;
-    if (name == "IEND") break;
+  for (auto chunk = png_chunk(bytes, first_png_chunk); chunk; chunk = png_chunk(bytes, chunk->end)) {
+    if (chunk->name == "acTL") first.pictures = Numbers{chunk->content, true}.of(0, 4);
+    if (chunk->name == "IEND") return {first.pictures, chunk->end};
   }
   return first;
 }

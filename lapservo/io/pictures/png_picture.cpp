@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "lapservo/io/pictures/png_chunk.h"
 #include "lapservo/io/tables/numbers.h"
 
 namespace lapservo::internal {
@@ -41,15 +42,8 @@ void read_bytes(png_structp png, png_bytep out, std::size_t count) {
 
 // The content of a chunk before the data; empty where there is none.
 std::span<const std::uint8_t> chunk_in(std::span<const std::uint8_t> png, std::string_view wanted) {
-  constexpr std::size_t signature = 8, around = 12;  // length, name and checksum
-  const Numbers numbers{png, true};
-  for (std::size_t at = signature; at + around <= png.size();) {
-    const std::string_view name(reinterpret_cast<const char*>(&png[at + 4]), 4);
-    const std::size_t length = numbers.of(at, 4);
-    if (name == "IDAT" || length > png.size() - at - around) break;
-    if (name == wanted) return png.subspan(at + 8, length);
-    at += around + length;
-  }
+  for (auto chunk = png_chunk(png, first_png_chunk); chunk && chunk->name != "IDAT"; chunk = png_chunk(png, chunk->end))
+    if (chunk->name == wanted) return chunk->content;
   return {};
 }
 

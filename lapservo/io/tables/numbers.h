@@ -3,8 +3,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string_view>
 
 namespace lapservo::internal {
+
+inline std::string_view text_of(std::span<const std::uint8_t> bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
 
 /// Unsigned numbers at a place of bytes of either order; 0 beyond their end.
 struct Numbers {

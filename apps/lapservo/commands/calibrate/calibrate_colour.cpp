@@ -4,6 +4,7 @@
 
 #include "apps/lapservo/cli/interrupt.h"
 #include "apps/lapservo/cli/subcommands.h"
+#include "apps/lapservo/commands/calibrate/calibrate_inputs.h"
 #include "apps/lapservo/commands/calibrate/calibrate_steps.h"
 #include "apps/lapservo/inputs/frame_input.h"
 #include "lapservo/calibration/colour/colour_measurement.h"
@@ -21,6 +22,7 @@ void print(const Instrument& instrument, const ColourCalibration& calibration, s
     std::printf("  band %zu   %8.1f   %7.1f   %5.1f\n", band, instrument.marker.hues_deg[band],
                 calibration.hues_deg[band], calibration.sigma_hues_deg[band]);
   std::printf("\nresponse: %s\n", calibration.response_found.c_str());
+  print_faults(calibration.faults);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "lapservo/calibration/fit/departures.h"
+#include "lapservo/core/departures.h"
 
 #include <cmath>
 #include <cstdint>

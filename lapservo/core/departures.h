@@ -39,6 +39,17 @@ struct Departures {
   Eigen::MatrixXd by_seen, by_instead;
 };
 
+/// The faults that are seen, with their size; `possible` has one for each column of the slopes.
+template <typename Described>
+std::vector<Described> seen_of(const Departures& departures, const std::vector<Described>& possible) {
+  std::vector<Described> seen;
+  for (const Fault& fault : departures.seen) {
+    seen.push_back(possible[fault.which]);
+    seen.back().size = fault.size;
+  }
+  return seen;
+}
+
 /// To first order. `slopes`: of the residuals, a column a fault.
 Departures departures_of(const LinearFit& fit, const Eigen::MatrixXd& slopes);
 
