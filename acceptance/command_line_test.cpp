@@ -153,8 +153,9 @@ TEST_F(CommandLine, SaysWhatToDoAboutAPrintThatIsOff) {
   write_file("out/printed.yaml", replaced(upper, "[0.0095, 0.0095, 0.005]", "[0.0097, 0.0095, 0.0048]"));
   expect_done("render --rig out/printed.yaml --out out/frames --count 2 --seed 5");
   EXPECT_EQ(run("track out/frames --rig configs/example.yaml --out out/obs.csv"), 1);
-  expect_in(errors(), "in 2 of 2 frames the print is not as the rig says (marker_mismatch)");
+  expect_in(errors(), "2 of 2 frames are marker_mismatch: the print is not as the rig says");
   expect_in(errors(), "lapservo calibrate marker");
+  expect_in(output(), "PSM1: 2 marker_mismatch: the print is not as the rig says");
   EXPECT_EQ(CsvTable::read("out/obs.csv").text(0, "status"), "marker_mismatch");
 }
 

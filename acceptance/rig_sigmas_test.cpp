@@ -45,7 +45,7 @@ class Spread {
     return most;
   }
   void print(const std::string& row, int told, int frames) const {
-    std::printf("  %-34s told %d of %d; error / sigma:", row.c_str(), told, frames);
+    std::printf("  %-34s found %d of %d; error / sigma:", row.c_str(), told, frames);
     for (std::size_t i = 0; i < names_.size(); ++i) std::printf(" %s %.2f", names_[i].c_str(), of(i));
     std::printf("; worst %.1f\n", worst());
   }

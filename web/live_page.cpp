@@ -19,7 +19,7 @@ namespace {
 
 constexpr auto between_drawings = std::chrono::milliseconds(25), recent = std::chrono::milliseconds(100),
                between_looks = std::chrono::milliseconds(2);
-constexpr auto watched = std::chrono::seconds(2);
+constexpr auto watched = std::chrono::seconds(2), old = std::chrono::seconds(1);
 constexpr double start_lasts_s = 1;
 constexpr int jpeg_quality = 80;
 constexpr std::size_t most_events = 8;
@@ -203,10 +203,12 @@ HttpResponse LivePage::state() {
   const auto now = std::chrono::steady_clock::now();
   state["now_s"] = seconds(now.time_since_epoch());
   std::vector<Observation> observations;
+  std::optional<double> silent_s;
   {
     const std::lock_guard lock(mutex_);
     fetch();
     observations = newest_.image.observations;
+    if (config_.live && now - newest_.came > old) silent_s = seconds(now - newest_.came);
     state["images"] = newest_.number;
     state["loop"] = told_ ? json_of(told_->loop) : nlohmann::ordered_json();
     state["loop_age_s"] = told_ ? nlohmann::ordered_json(seconds(now - told_->when)) : nlohmann::ordered_json();
@@ -215,7 +217,7 @@ HttpResponse LivePage::state() {
       for (const Event& event : *told_->events)
         state["events"].push_back({{"time_s", event.time_s}, {"state", event.state}});
   }
-  state["instruments"] = json_of(observations);
+  state["instruments"] = json_of(observations, silent_s);
   state["asked"] = hold_ ? "hold" : is_recent_start(start_s_) ? "start" : "";
   return {200, "application/json", text_of(state)};
 }

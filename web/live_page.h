@@ -47,6 +47,7 @@ struct PageLoop {
   std::optional<Eigen::Vector4d> desired, features, error;
   double delay_s = 0;  ///< of its images
   bool limited = false;
+  bool can_start = true;  ///< Supervisor::can_start()
 };
 
 /// The commands of the page's users.

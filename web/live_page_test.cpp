@@ -125,6 +125,21 @@ TEST(LivePage, TellsWhatTheLoopDoes) {
     EXPECT_NE(state.find(part), std::string::npos) << part << " in " << state;
 }
 
+// An image that is old says nothing of now.
+TEST(LivePage, ForgetsWhatOldImagesShowed) {
+  PageConfig config = config_of_test();
+  config.live = true;
+  Served page(config);
+  PageImage image = image_of(testing::small_test_rig(), 10);
+  image.observations[0].status = Status::ok;
+  image.age_s = 5.2;
+  page.show(image);
+  EXPECT_TRUE(page.tells(R"({"name":"PSM1","status":"no image for 5 s"})"));
+  image.age_s = 0;
+  page.show(image);
+  EXPECT_TRUE(page.tells(R"("name":"PSM1","status":"ok")"));
+}
+
 TEST(LivePage, HoldsAlwaysAndStartsOnlyWhereMotionIsEnabled) {
   PageConfig config = config_of_test();
   {

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include <fmt/format.h>
+
 #include "lapservo/core/joint_vector.h"
 #include "lapservo/kinematics/feature_map.h"
 #include "web/live_page.h"
@@ -35,9 +37,13 @@ json features_of(const Features& features) {
 
 }  // namespace
 
-json json_of(const std::vector<Observation>& observations) {
+json json_of(const std::vector<Observation>& observations, std::optional<double> silent_s) {
   json instruments = json::array();
   for (const Observation& seen : observations) {
+    if (silent_s) {
+      instruments.push_back({{"name", seen.instrument}, {"status", fmt::format("no image for {:.0f} s", *silent_s)}});
+      continue;
+    }
     json one{{"name", seen.instrument}, {"status", to_string(seen.status)}};
     if (seen.status == Status::ok) {
       one["tau_rad"] = number(seen.tau_rad, seen.sigma_tau_rad);
@@ -61,7 +67,11 @@ json json_of(const PageLoop& loop) {
                         {"desired", four(loop.desired, i)},
                         {"error", four(loop.error, i)}});
   }
-  return {{"time_s", loop.time_s}, {"delay_s", loop.delay_s}, {"limited", loop.limited}, {"features", features}};
+  return {{"time_s", loop.time_s},
+          {"delay_s", loop.delay_s},
+          {"limited", loop.limited},
+          {"can_start", loop.can_start},
+          {"features", features}};
 }
 
 std::string text_of(const json& value) {

@@ -208,6 +208,11 @@ def see_no_late_start(browser, lapservo):
     state(browser, "track")
 
 
+def see_no_start_of_an_arm_that_is_not_ready(browser):
+    shown = "(showState({ ...last, loop: { ...last.loop, can_start: %s } }), document.getElementById('start').disabled)"
+    assert browser.value(shown % "false") and not browser.value(shown % "true")
+
+
 def see_the_loop(browser, tool, rig, folder):
     # A simulation that is watched for long enough; it ends by the page's button.
     lapservo, url = start(tool, "servo", "--rig", rig, "--robot", "sim", "--duration", "3600", "--web", "0", "--listen", "0.0.0.0")
@@ -228,6 +233,7 @@ def see_the_loop(browser, tool, rig, folder):
             browser.value("document.getElementById('start').focus()")
             browser.enter()
             state(browser, "track")
+        see_no_start_of_an_arm_that_is_not_ready(browser)
         see_no_stray_start(browser)
         see_no_late_start(browser, lapservo)
         assert not browser.complaints, browser.complaints

@@ -6,10 +6,11 @@ namespace lapservo {
 using namespace internal;
 namespace {
 
-constexpr Words<HoldReason, 22> reason_words{{{HoldReason::none, "none"},
+constexpr Words<HoldReason, 23> reason_words{{{HoldReason::none, "none"},
                                               {HoldReason::no_image_yet, "no_image_yet"},
                                               {HoldReason::marker_lost, "marker_lost"},
                                               {HoldReason::stale_image, "stale_image"},
+                                              {HoldReason::slow_images, "slow_images"},
                                               {HoldReason::frozen_image, "frozen_image"},
                                               {HoldReason::wild_joints, "wild_joints"},
                                               {HoldReason::endoscope_moved, "endoscope_moved"},

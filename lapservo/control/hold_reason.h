@@ -10,6 +10,7 @@ enum class HoldReason {
   no_image_yet,
   marker_lost,          ///< the latest image does not show the marker
   stale_image,          ///< no usable image for too long, or one that was too old when it came
+  slow_images,          ///< images usually come less often than every ControllerConfig::stale_after_s
   frozen_image,         ///< the same image again, whatever its stamp: noise repeats, or joints move and features don't
   wild_joints,          ///< measured joints that no arm can have come to since the last ones
   endoscope_moved,      ///< the shaft misses the RCM all of a sudden: the operator's motion is to show where it is now

@@ -60,7 +60,8 @@ struct Flaws {
   Eigen::Vector4d noise{4e-4, 0.15, 0.15, 0.15};       ///< of the image
   long frame_every = 1;                                ///< control periods a frame
   double dropped = 0;                                  ///< fraction of frames that never come
-  double jitter_s = 0;                                 ///< of the steps' times, at most
+  std::function<bool(double time_s)> lost = [](double) { return false; };  ///< such a frame never comes
+  double jitter_s = 0;                                                     ///< of the steps' times, at most
   std::function<bool(double time_s)> hidden = [](double) { return false; };
   std::function<ImageMeasurement(const ImageMeasurement&)> spoil = [](const ImageMeasurement& m) { return m; };
   std::function<Eigen::Vector4d(double time_s)> misread = [](double) {  // what the measured joints are off by
@@ -99,7 +100,8 @@ class TestSimulator {
       moment.truth = exact_map(rig_, q_true()).value();
       const DesiredFeatures desired = trajectory.at(time_s);
       moment.error = feature_error(moment.truth.features, desired.features);
-      if (k % flaws_.frame_every == 0 && random_.uniform() >= flaws_.dropped) expose(time_s, moment.truth);
+      if (k % flaws_.frame_every == 0 && random_.uniform() >= flaws_.dropped && !flaws_.lost(time_s))
+        expose(time_s, moment.truth);
       moment.step = controller.step(time_s, q_measured() + flaws_.misread(time_s), arrived(time_s), desired);
       move(controller, std::max(time_s, moved_s_), start_s_ + static_cast<double>(k + 1) * period_s);
       moments.push_back(moment);

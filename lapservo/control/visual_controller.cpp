@@ -85,7 +85,7 @@ ControlStep VisualController::step(double time_s, const Eigen::Vector4d& q_joint
     watch_image_age();
     if (suspended_ == HoldReason::none) step.estimate = estimator_->at(time_s, q_joint);
   }
-  if (step.reason == HoldReason::none) step.reason = image_reason_;
+  if (step.reason == HoldReason::none) step.reason = by_their_rate(image_reason_);
   if (step.reason == HoldReason::none && !(image_s_ >= needed_since_s_)) step.reason = HoldReason::stale_image;
   if (follows_ && step.reason == HoldReason::none && suspended_ == HoldReason::none) step.reason = until_start_;
   if (step.reason == HoldReason::image_not_following) step.unanswered = image_response_.unanswered();
@@ -173,7 +173,10 @@ HoldReason VisualController::update(const ImageMeasurement& image) {
   const HoldReason reason = suspended ? HoldReason::none : estimator_->update(image, history_);
   // A probing motion ends when the image has shown each joint's.
   if (probed && reason == HoldReason::none && !estimator_->probing_velocity(0)) image_response_.confirm_all();
-  if (reason == HoldReason::none) usable_s_ = now_s_;
+  if (reason == HoldReason::none) {
+    slow_images_.add(stale_);
+    usable_s_ = now_s_;
+  }
   if (reason == HoldReason::delay_not_found) until_start_ = reason;
   if (suspended) {
     image_response_.interrupt();
@@ -195,8 +198,15 @@ void VisualController::watch_error(const DesiredFeatures& desired, const Control
 }
 
 void VisualController::watch_image_age() {
-  if (now_s_ - usable_s_ > config_.stale_after_s && image_reason_ == HoldReason::none)
-    image_reason_ = HoldReason::stale_image;
+  stale_ = now_s_ - usable_s_ > config_.stale_after_s;
+  if (stale_ && image_reason_ == HoldReason::none) image_reason_ = HoldReason::stale_image;
+}
+
+// The next image is soon here, and would be stale again before the one after it.
+HoldReason VisualController::by_their_rate(HoldReason reason) const {
+  const bool soon = now_s_ - usable_s_ < 10 * config_.stale_after_s;
+  const bool usable = reason == HoldReason::none || (reason == HoldReason::stale_image && soon);
+  return usable && slow_images_.are_slow() ? HoldReason::slow_images : reason;
 }
 
 VisualController::Law VisualController::decide(HoldReason reason, const std::optional<Estimate>& estimate,

@@ -20,6 +20,7 @@
 #include "lapservo/control/image_measurement.h"
 #include "lapservo/control/image_response.h"
 #include "lapservo/control/joint_history.h"
+#include "lapservo/control/slow_images.h"
 #include "lapservo/control/trajectory.h"
 #include "lapservo/control/wild_joints.h"
 #include "lapservo/robot/joint_path.h"
@@ -92,6 +93,7 @@ class VisualController {
   HoldReason update(const ImageMeasurement& image);
   void compare_motion(const ImageMeasurement& image);
   void watch_image_age();
+  HoldReason by_their_rate(HoldReason reason) const;
   void watch_error(const DesiredFeatures& desired, const ControlStep& step);
   Law decide(HoldReason reason, const std::optional<Estimate>& estimate, const DesiredFeatures& desired) const;
   Law probing_law(const Eigen::Vector4d& velocity) const;
@@ -122,6 +124,8 @@ class VisualController {
   HoldReason image_reason_ = HoldReason::no_image_yet;  ///< of the latest image
   std::optional<double> image_s_;                       ///< stamp of the latest image
   double usable_s_ = 0;                                 ///< when the last usable one arrived
+  bool stale_ = false;                                  ///< it is too old
+  SlowImages slow_images_;
   double needed_since_s_ = -std::numeric_limits<double>::infinity();
 };
 

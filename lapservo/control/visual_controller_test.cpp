@@ -203,6 +203,53 @@ TEST(VisualController, CopesWithDroppedFramesFastStepsAndTheirJitter) {
   }
 }
 
+struct Holds {
+  int changes = 0;  ///< of the reason
+  double slow_s = 0, stale_s = 0;
+};
+
+// From 2 s to 22 s, one image in so many periods, with jitter and pauses of 0.3 s about every `pause_s`.
+Holds holds_at(long frame_every, double pause_s, std::uint64_t seed) {
+  Flaws flaws = usual_flaws();
+  flaws.frame_every = frame_every;
+  flaws.jitter_s = 0.005;
+  Random random(seed);
+  double pause_s_at = pause_s > 0 ? 1 : 1e9;
+  flaws.lost = [=](double time_s) mutable {
+    if (time_s > pause_s_at + 0.3) pause_s_at += 0.3 + random.uniform(0.5, 1.5) * pause_s;
+    return time_s >= pause_s_at && time_s < pause_s_at + 0.3;
+  };
+  const auto done = run(flaws, set_point(paper_sinusoids().offset), 22, seed);
+  Holds holds;
+  for (std::size_t k = 120; k < done.moments.size(); ++k) {
+    const HoldReason before = done.moments[k - 1].step.reason, now = done.moments[k].step.reason;
+    holds.changes += now != before;
+    holds.slow_s += now == HoldReason::slow_images ? 1.0 / 60 : 0;
+    holds.stale_s += now == HoldReason::stale_image ? 1.0 / 60 : 0;
+  }
+  return holds;
+}
+
+// Fewer than ten images a second are held once, not by turns.
+TEST(VisualController, HoldsOnceWhereImagesAreTooFew) {
+  const Holds few = holds_at(8, 0, 1);
+  EXPECT_EQ(few.changes, 0);
+  EXPECT_NEAR(few.slow_s, 20, 0.1);
+  const Holds enough = holds_at(5, 0, 1);
+  EXPECT_EQ(enough.changes, 0);
+  EXPECT_EQ(enough.slow_s + enough.stale_s, 0);
+}
+
+// At 15 images a second a pause holds while it lasts, however frequent pauses are.
+TEST(VisualController, PausesBetweenEnoughImagesAreNoSlowImages) {
+  for (const double pause_s : {4.0, 1.0, 0.5})
+    for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+      const Holds holds = holds_at(4, pause_s, seed);
+      EXPECT_EQ(holds.slow_s, 0) << pause_s << ", seed " << seed;
+      EXPECT_GT(holds.stale_s, 0);
+    }
+}
+
 TEST(VisualController, SendsNothingBeforeTheFirstMeasuredJoints) {
   VisualController controller({}, testing::model_of({}));
   const auto nothing = controller.step(0, Eigen::Vector4d::Constant(NAN), {}, {});

@@ -6,8 +6,8 @@
 
 namespace lapservo::internal {
 
-/// Of camera_from_rcm: its translation [m], then a rotation vector about the camera's axes [rad]. The rig's, else by
-/// its sigmas, which know no correlations; zero of what it has none of.
+/// Covariance of camera_from_rcm: its translation [m], then a rotation vector about the camera's axes [rad]. The rig's,
+/// else by its sigmas, which know no correlations; zero of what it has none of.
 Eigen::Matrix<double, 6, 6> registration_covariance(const Instrument& instrument);
 
 /// The same of a covariance of a rotation about the RCM frame's own axes, then of the translation.

@@ -11,6 +11,8 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/format.h>
+
 #include "lapservo/core/dense_matrix.h"
 #include "lapservo/core/joint_units.h"
 #include "lapservo/core/known_keys.h"
@@ -152,10 +154,13 @@ Camera parse_camera_fields(const YamlField& field) {
 
   const auto k = parse_matrix<9>(field["camera_matrix"], 3, 3, "nine numbers, fx 0 cx 0 fy cy 0 0 1");
   const bool pinhole = k[0] > 0 && k[4] > 0 && k[1] == 0 && k[3] == 0 && k[6] == 0 && k[7] == 0 && k[8] == 1;
-  if (!pinhole || k[0] > 1e6 || k[4] > 1e6 || std::abs(k[2]) > 1e6 || std::abs(k[5]) > 1e6) {
+  const double least_px = 0.1 * camera.width_px;  // sees 157 degrees
+  if (!pinhole || k[0] < least_px || k[4] < least_px || k[0] > 1e6 || k[4] > 1e6 || std::abs(k[2]) > 1e6 ||
+      std::abs(k[5]) > 1e6) {
     std::ostringstream got;
     for (const double value : k) got << value << ' ';
-    field["camera_matrix"]["data"].fail(got.str(), "fx 0 cx 0 fy cy 0 0 1 with fx and fy above 0 (pixels)");
+    field["camera_matrix"]["data"].fail(
+        got.str(), fmt::format("fx 0 cx 0 fy cy 0 0 1 with fx and fy in pixels, at least {:g}", least_px));
   }
   camera.fx_px = k[0], camera.cx_px = k[2], camera.fy_px = k[4], camera.cy_px = k[5];
   if (const YamlField coefficients = field["distortion_coefficients"]; coefficients.present()) {

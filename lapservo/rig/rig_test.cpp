@@ -171,7 +171,7 @@ const std::string pixels = "expected a whole number of pixels, 16 to 16384";
 const std::string finite = "expected a finite number";
 const std::string response =
     "expected srgb, rec709, linear, gamma:VALUE with a value of 0.2 to 5, or a table of light and value";
-const std::string matrix = " , expected fx 0 cx 0 fy cy 0 0 1 with fx and fy above 0 (pixels)";
+const std::string matrix = " , expected fx 0 cx 0 fy cy 0 0 1 with fx and fy in pixels, at least 128";
 const std::string quaternion = "expected x y z w of a unit quaternion, to four digits";
 const std::string diameter = "expected 0.0005 to 0.1 (metres)";
 const std::string not_decodable = "is not decodable, expected bands whose cross-ratio is monotonic over the rotation: ";
@@ -257,6 +257,7 @@ const Complaints impossible_cameras{
     {with("plumb_bob", "equidistant"),
      "camera.distortion_model: is equidistant, expected plumb_bob, which lapservo calibrate camera fits"},
     {with("[1100", "[-1100"), "camera.camera_matrix.data: is -1100 0 639.5 0 1090 359.5 0 0 1" + matrix},
+    {with("[1100", "[4.2"), "camera.camera_matrix.data: is 4.2 0 639.5 0 1090 359.5 0 0 1" + matrix},
     {with("1090", "1e7"), "camera.camera_matrix.data: is 1100 0 639.5 0 1e+07 359.5 0 0 1" + matrix},
     {with("[1100, 0,", "[1100, 2,"), "camera.camera_matrix.data: is 1100 2 639.5 0 1090 359.5 0 0 1" + matrix},
     {with("-0.1", "-5"),

@@ -98,15 +98,19 @@ void Supervisor::end() {
   robot_.release();
 }
 
+bool Supervisor::can_start() const {
+  return !input_.ended && input_.arm == Blocked::none && input_.operator_present;
+}
+
 Blocked Supervisor::blocked() const {
   if (armed()) return Blocked::none;
   if (state_.obstacle != Blocked::none) return state_.obstacle;
   return state_.phase == SupervisorState::Phase::held ? state_.reason : Blocked::arming;
 }
 
-std::string Supervisor::remedy() const {
-  if (state_.obstacle == Blocked::not_enabled) return fmt::format("the arm is {}: enable it", operating_state_);
-  return std::string(internal::word_of(remedies, state_.obstacle));
+std::string Supervisor::remedy(Blocked obstacle) const {
+  if (obstacle == Blocked::not_enabled) return fmt::format("the arm is {}: enable it", operating_state_);
+  return std::string(internal::word_of(remedies, obstacle));
 }
 
 std::string Supervisor::text() const {
@@ -116,10 +120,11 @@ std::string Supervisor::text() const {
   if (blocked() == Blocked::ended) return "hold: ended";
   if (blocked() == Blocked::held) {
     part = fmt::format("by {}: start there, or with force", names_of(state_.held_by));
+    if (input_.arm != Blocked::none) part += fmt::format("; {}: {}", to_string(input_.arm), remedy(input_.arm));
   } else if (blocked() == Blocked::arming) {
     part = fmt::format("the arm has to be ready for {} s", config_.settle_s);
   } else if (state_.obstacle != Blocked::none) {
-    part = remedy() + (state_.phase == Phase::held ? ", then start" : "");
+    part = remedy(state_.obstacle) + (state_.phase == Phase::held ? ", then start" : "");
   } else {
     part = (state_.reason == Blocked::loop_held ? loop_reason_ + "; " : "") + "say start to continue";
   }

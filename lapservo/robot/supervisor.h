@@ -45,13 +45,15 @@ class Supervisor : public Robot {
   bool armed() const { return state_.phase == SupervisorState::Phase::armed; }
   /// Held until a start; else the arm moves, or will as soon as it is ready.
   bool held() const { return state_.phase == SupervisorState::Phase::held; }
+  /// Whether a start counts now, as far as the arm and its operator go.
+  bool can_start() const;
   /// Why the arm is not moved: none while armed.
   Blocked blocked() const;
   /// Why and what is to be done, in one line: "hold: not_homed (home the arm, then start)"; empty while armed.
   std::string text() const;
 
  private:
-  std::string remedy() const;
+  std::string remedy(Blocked obstacle) const;
 
   Robot& robot_;
   const Clock& clock_;

@@ -259,6 +259,25 @@ TEST(Supervisor, AStopBeatsAStartAndOldStartsAreVoid) {
   EXPECT_TRUE(bench.moves());
 }
 
+TEST(Supervisor, AHoldDoesNotHideWhatBecomesOfTheArm) {
+  Bench bench;
+  bench.pass(1);
+  bench.supervisor.stop(Commander::page);
+  bench.pass(0.1);
+  EXPECT_TRUE(bench.supervisor.can_start());
+  bench.reading_age_s = 5;  // killed
+  bench.pass(0.1);
+  EXPECT_EQ(
+      bench.supervisor.text(),
+      "hold: held (by the page: start there, or with force; old_joint_states: the arm is silent: restore its joint "
+      "states)");
+  EXPECT_FALSE(bench.supervisor.can_start());
+  bench.reading_age_s = 0;
+  bench.pass(0.1);
+  EXPECT_EQ(bench.supervisor.text(), "hold: held (by the page: start there, or with force)");
+  EXPECT_TRUE(bench.supervisor.can_start());
+}
+
 TEST(Supervisor, WhoHoldsHasToLetGoUnlessTheStartHasForce) {
   Bench bench;
   bench.pass(1);

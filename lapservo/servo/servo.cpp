@@ -32,6 +32,8 @@ std::string unanswered_text(const Unanswered& found, const std::array<std::strin
 
 std::string remedy_of(const ControlStep& control, const std::array<std::string, 4>& names) {
   switch (control.reason) {
+    case HoldReason::slow_images:
+      return "at least 10 images a second are needed: check the camera's rate, its exposure and the network";
     case HoldReason::endoscope_moved:
       return "move the instrument, by hand or teleoperation, until endoscope_measured";
     case HoldReason::endoscope_measured:

@@ -20,8 +20,8 @@ namespace lapservo::internal {
 
 /// Method::surface: coarse search for the markers' colours, then a fit over all visible generatrices.
 ///
-/// A shaft is held at the RCM as well as the registration knows it. Where the image contradicts that, the shaft is fitted
-/// without it: the image features are right then, and q is given only as far as the mismatch lets it be known.
+/// A shaft is held at the RCM as well as the registration knows it. Where the image contradicts that, the shaft is
+/// fitted without it: the image features are right then, and q is given only as far as the mismatch lets it be known.
 class SurfaceTracker {
  public:
   /// `single`: every frame on its own. `frame_budget`, `max_p_false`: as TrackerOptions has them.

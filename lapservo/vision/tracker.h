@@ -32,8 +32,8 @@ struct TrackerOptions {
   /// nullopt. Frames of `single` are always searched whole. What can't wait for the next frame goes beyond the budget:
   /// who is followed, a second print's place, a registration that is contradicted, a shaft that the border cuts.
   std::optional<double> frame_budget = 8000;
-  /// Method::surface: an instrument is `uncertain` where Observation::p_false is larger, beyond 1.5 times what the rig's
-  /// own tolerance of the print adds. Above 0, at most 1.
+  /// Method::surface: an instrument is `uncertain` where Observation::p_false is larger, beyond 1.5 times what the
+  /// rig's own tolerance of the print adds. Above 0, at most 1.
   double max_p_false = Observation::usual_max_p_false;
 };
 

@@ -68,13 +68,13 @@ function showLoop(state) {
 function showState(state) {
   last = state;
   text(at("title"), `lapservo ${state.title}`);
-  at("start").disabled = !state.may_start;
+  at("start").disabled = !state.may_start || (state.loop !== null && !state.loop.can_start);
   at("hold").disabled = !state.has_loop;
   at("hold").hidden = !state.has_loop;
   at("start").hidden = !state.has_loop || state.has_run_button;
   at("run").hidden = !state.has_run_button;
   if (!at("note").dataset.said)
-    text(at("note"), state.has_loop && !state.may_start ? "Start needs lapservo servo --enable-motion." : "");
+    text(at("note"), state.has_loop && !state.may_start ? "Start needs lapservo servo --enable-motion." : at("start").disabled ? "Start needs an arm that is ready." : "");
   showLoop(state);
   at("instruments").replaceChildren(...state.instruments.map(instrumentTable));
 }

@@ -58,7 +58,7 @@ int check(const CalibrateOptions& options) {
   const FramesRead read = read_frames({*source, options.input, options.deinterlace}, rig, every_of(*source, enough),
                                       watched_job(), [&](const cv::Mat& bgr, double time_s) {
                                         const bool found = evidence.add(bgr, time_s);
-                                        if (!found && count == 0) diagnosis.add(bgr, {});
+                                        diagnosis.add(bgr, {});
                                         (found ? seen : missed) = bgr, count += found;
                                         return fmt::format(", {} in {}", instrument.name, count);
                                       });
@@ -74,7 +74,7 @@ int check(const CalibrateOptions& options) {
     checked.findings = findings_of(rig, index, evidence);
     checked.frames = evidence.frames();
     checked.findings.lossy = read.lossy;
-    if (count == 0) checked.findings.cause = diagnosis.cause();
+    if (checked.findings.found == 0) checked.findings.cause = diagnosis.cause();
     // Takes as long as the rest, which needs nothing of it.
     std::future<PrintCheck> print;
     if (checked.findings.light)

@@ -9,6 +9,7 @@
 #include <set>
 #include <string>
 #include <system_error>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -21,8 +22,10 @@
 #include "apps/lapservo/inputs/input_files.h"
 #include "apps/lapservo/inputs/live_frames.h"
 #include "lapservo/calibration/check/frame_diagnosis.h"
+#include "lapservo/calibration/check/usual_cause.h"
 #include "lapservo/core/error.h"
 #include "lapservo/io/frame_source.h"
+#include "lapservo/io/image_file.h"
 #include "lapservo/io/overlay.h"
 #include "lapservo/io/tables/observation_csv.h"
 #include "lapservo/io/video/overlay_writer.h"
@@ -133,13 +136,14 @@ class RigByFrame {
 
 struct Tally {
   int frames = 0;
-  std::map<std::string, int> found, mismatched;
+  std::map<std::string, int> found;
+  std::map<std::pair<std::string, Status>, int> refused;
 
   void add(const std::vector<Observation>& observations) {
     ++frames;
     for (const Observation& observation : observations) {
       found[observation.instrument] += observation.status == Status::ok;
-      mismatched[observation.instrument] += observation.status == Status::marker_mismatch;
+      if (observation.status != Status::ok) ++refused[{observation.instrument, observation.status}];
     }
   }
   std::string text() const {
@@ -147,24 +151,15 @@ struct Tally {
     for (const auto& [name, count] : found) line += fmt::format(", {} in {}", name, count);
     return line;
   }
+  void print_refused() const {
+    for (const auto& [of, count] : refused)
+      std::printf("  %s: %d %s: %s\n", of.first.c_str(), count, std::string(to_string(of.second)).c_str(),
+                  usual_cause(of.second));
+  }
   bool anything() const {
     return std::any_of(found.begin(), found.end(), [](const auto& entry) { return entry.second > 0; });
   }
 };
-
-// Whether there was something to say.
-bool say_mismatched(const Tally& tally) {
-  bool any = false;
-  for (const auto& [name, count] : tally.mismatched) {
-    if (count == 0) continue;
-    any = true;
-    std::fprintf(stderr,
-                 "lapservo: %s: in %d of %d frames the print is not as the rig says (marker_mismatch); lapservo "
-                 "calibrate marker measures it from a slow turn\n",
-                 name.c_str(), count, tally.frames);
-  }
-  return any;
-}
 
 void say_moved(const TrackOptions& options, const Frame& frame) {
   std::fprintf(stderr,
@@ -251,6 +246,7 @@ class TrackRun {
             frame->flaw ? tracker.refuse(*frame->flaw) : tracker.track(frame->bgr, frame->time_s);
         tally_.add(observations);
         if (registration_.add(observations)) say_moved(options_, *frame);
+        lossy_ |= has_jpeg_extension(frame->file);
         diagnosis().add(frame->bgr, observations);
         if ((stopped_ = !pass_on(*frame, observations, came_s))) return;
       } catch (const InputError& error) {
@@ -274,6 +270,7 @@ class TrackRun {
 
   void tell_results() const {
     std::printf("%s%d frames%s\n", stopped_ ? "stopped after " : "", tally_.frames, tally_.text().c_str());
+    tally_.print_refused();
     if (!rigs_.found().empty()) std::printf("rig: %s\n", rigs_.found().c_str());
     if (csv_) std::printf("observations: %s\n", options_.out.c_str());
     if (overlay_) std::printf("overlay: %s\n", options_.overlay.c_str());
@@ -288,11 +285,8 @@ class TrackRun {
                    complaint.c_str());
       return 1;
     }
-    const std::string diagnosis = diagnosis_ ? diagnosis_->text() : "no frame came";
-    const bool explained = tally_.anything() ? !diagnosis.empty() : diagnosis_ && !diagnosis_->cause().empty();
-    const bool mismatched = !explained && say_mismatched(tally_);
-    if (!diagnosis.empty() && !mismatched)
-      std::fprintf(stderr, "lapservo: %s: %s\n", options_.input.c_str(), diagnosis.c_str());
+    const std::string diagnosis = diagnosis_ ? diagnosis_->text(lossy_ || source_.is_lossy()) : "no frame came";
+    if (!diagnosis.empty()) std::fprintf(stderr, "lapservo: %s: %s\n", options_.input.c_str(), diagnosis.c_str());
     return tally_.anything() ? 0 : 1;
   }
 
@@ -318,7 +312,7 @@ class TrackRun {
   RegistrationWatch registration_;
   std::shared_ptr<const Rig> diagnosed_;
   std::optional<FrameDiagnosis> diagnosis_;  // of frames with that rig
-  bool stopped_ = false, read_to_the_end_ = false;
+  bool stopped_ = false, read_to_the_end_ = false, lossy_ = false;
 };
 
 int run(const TrackOptions& options) {

@@ -78,7 +78,7 @@ void BoardRecordings::look_at(FrameSource& source, const std::string& name, cons
     check_frame_size(*frame, name, *size_, whose_);
     if (read++ % every != 0) continue;
     if (frame->flaw) {
-      read_.flawed.add(*frame->flaw);
+      read_.flawed.add(*frame->flaw, frame->bgr);
       continue;
     }
     ++read_.looked_at;

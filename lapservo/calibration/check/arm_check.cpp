@@ -141,6 +141,8 @@ ArmCheck check_arm(const Instrument& instrument, const Camera& camera, const std
                    marker_at(instrument, *instrument.camera_from_rcm, *instrument.joints, start.joints[i]),
                    marker_at(instrument, camera_from_rcm, joints, start.joints[i])));
   const Eigen::Vector3d sigmas = registration_sigmas(*best);
+  for (std::size_t i = 0; i < joints.sign.size(); ++i)
+    if (joints.sign[i] != instrument.joints->sign[i]) check.other_signs.push_back(joints.names[i]);
   check.place_m = Told{rms(between, &ArmResidual::position_m), sigmas[0]};
   check.axis_rad = Told{rms(between, &ArmResidual::axis_rad), sigmas[1]};
   check.roll_rad = Told{rms(between, &ArmResidual::roll_rad), sigmas[2]};

@@ -46,6 +46,7 @@ struct ArmCheck {
   double measured_delay_s = 0;
   /// camera_from_rcm and joints: rms over the frames of where they put the marker, at its place, direction and turn.
   std::optional<Told> place_m, axis_rad, roll_rad;
+  std::vector<std::string> other_signs;  ///< of joints whose sign is not the rig's
 };
 
 /// Needs TimedPose::by_focal for `focal`. Throws as register_arm() does. Where the instrument has no camera_from_rcm,

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,7 +15,7 @@ namespace lapservo::internal {
 
 /// Why frames of a recording are flawed, show no instrument of a rig, or an instrument that misses the rig's RCM.
 /// Frames are added as they are tracked; a few of those without a result are kept and tried again in other readings
-/// (red and blue exchanged, mirrored) when text() or cause() is called.
+/// (other_readings.h) when text() or cause() is called.
 class FrameDiagnosis {
  public:
   /// `deinterlaced`: one field of each frame is tracked.
@@ -24,8 +25,9 @@ class FrameDiagnosis {
   void add(const cv::Mat& bgr, const std::vector<Observation>& observations);
 
   /// One line that names the most probable cause and its remedy, without a full stop; empty where at least half of the
-  /// frames that show an instrument give q, or give features where the rig has no camera_from_rcm.
-  std::string text() const;
+  /// frames show an instrument, and at least half of those give q, or features where the rig has no camera_from_rcm.
+  /// `lossy`: the recording is compressed.
+  std::string text(bool lossy = false) const;
 
   /// To append to a refusal: "; " and the cause where frames without an instrument show one, else nothing.
   std::string cause() const;
@@ -33,20 +35,28 @@ class FrameDiagnosis {
  private:
   struct Seen {
     int ok = 0, with_q = 0;
+    std::map<Status, int> refused;
     std::vector<double> misses_m;  ///< distances of the shaft's axis from the rig's RCM, where q is missing
     int reversed = 0;              ///< of them, those whose marker points back to the RCM
   };
+  struct Refusal {
+    std::string instrument;
+    Status status;
+    int frames;
+  };
   void keep(const cv::Mat& bgr);
-  std::string cause_in_frames() const;
+  std::optional<Refusal> most_frequent() const;
+  std::string cause_in_frames(bool found_nowhere) const;
+  std::string text_of_refusals(bool lossy) const;
   std::string text_of_missed_rcm() const;
 
   Rig rig_;
   bool deinterlaced_;
-  int frames_ = 0, interlaced_ = 0;
+  int frames_ = 0, without_instrument_ = 0, interlaced_ = 0;
   FlawedFrames flawed_;
   std::map<std::string, Seen> seen_;
   std::vector<cv::Mat> kept_;
-  int without_result_ = 0;  ///< frames
+  int without_result_ = 0;  ///< frames, some of which may show an instrument that misses the rig's RCM
 };
 
 }  // namespace lapservo::internal

@@ -1,6 +1,7 @@
 #include "lapservo/calibration/check/frame_diagnosis.h"
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -44,7 +45,7 @@ TEST_F(FrameDiagnosisTest, NamesTheCauseWhereNothingIsFound) {
   const auto diagnose = [&](auto change) { return text(rig, change); };
   expect_names(diagnose([](cv::Mat& bgr) { cv::cvtColor(bgr, bgr, cv::COLOR_BGR2RGB); }), "red and blue are exchanged");
   expect_names(diagnose([](cv::Mat& bgr) { cv::flip(bgr, bgr, 1); }), "mirrored");
-  expect_names(diagnose([](cv::Mat& bgr) { bgr /= 16; }), "nearly black");
+  expect_names(diagnose([](cv::Mat& bgr) { bgr /= 16; }), "the frames are dark");
   expect_names(diagnose([](cv::Mat& bgr) {
                  cv::cvtColor(bgr, bgr, cv::COLOR_BGR2GRAY);
                  cv::cvtColor(bgr, bgr, cv::COLOR_GRAY2BGR);
@@ -61,7 +62,39 @@ TEST_F(FrameDiagnosisTest, GivesNoCauseWhereTheFramesShowNone) {
   bgr /= 16;
   FrameDiagnosis dark(rig);
   dark.add(bgr, {});
-  expect_names(dark.cause(), "; the frames are nearly black");
+  expect_names(dark.cause(), "; the frames are dark");
+}
+
+TEST_F(FrameDiagnosisTest, NamesWhatElseTheRigWouldHaveToSay) {
+  const auto believed = [&](auto change) {
+    Rig other = rig;
+    change(other);
+    return text(other, [](cv::Mat&) {});
+  };
+  expect_names(believed([](Rig& other) {
+                 std::swap(other.instruments[0].marker.hues_deg[0], other.instruments[0].marker.hues_deg[2]);
+               }),
+               "found with its hues in another order");
+  expect_names(believed([](Rig& other) { other.instruments[0].marker.diameter_m /= 2; }), "twice the rig's");
+  expect_names(believed([](Rig& other) { other.instruments[0].marker.diameter_m *= 2; }), "half the rig's");
+  expect_names(believed([](Rig& other) {
+                 other.camera.distortion = {-0.4, 0.2, 0, 0, 0};
+               }),
+               "without the rig's distortion_coefficients");
+  expect_names(believed([](Rig& other) { other.camera.fx_px *= 1.5, other.camera.fy_px *= 1.5; }),
+               "found with a focal length of about");
+}
+
+TEST_F(FrameDiagnosisTest, NamesCompressionOverexposureAndATurnedCamera) {
+  Observation refused;
+  refused.status = Status::poor_fit;
+  refused.instrument = rig.instruments[0].name;
+  FrameDiagnosis diagnosis(rig);
+  for (int i = 0; i < frames; ++i) diagnosis.add(scenes::render_nothing(rig, 7), {refused});
+  expect_names(diagnosis.text(true), "12 of 12 frames are poor_fit, and the recording is compressed");
+  expect_names(diagnosis.text(false), "compare diameter_m and bands");
+  expect_names(text(rig, [](cv::Mat& bgr) { bgr.convertTo(bgr, -1, 4, 120); }), "overexposed");
+  expect_names(text(rig, [](cv::Mat& bgr) { cv::rotate(bgr, bgr, cv::ROTATE_180); }), "turned by 180 degrees");
 }
 
 TEST_F(FrameDiagnosisTest, PointsAtTheHuesWhereTheMarkerIsAnother) {
@@ -91,17 +124,21 @@ TEST_F(FrameDiagnosisTest, NamesDeinterlacing) {
 
 TEST_F(FrameDiagnosisTest, NamesFlawedFramesBeforeAllElse) {
   const cv::Mat black = cv::Mat::zeros(rig.camera.height_px, rig.camera.width_px, CV_8UC3);
+  const cv::Mat bright(black.size(), black.type(), cv::Scalar::all(200));
   Tracker tracker(rig);
   for (const auto& [flaw, said] : {std::pair{Status::damaged, "20 of 20 frames are damaged: "},
                                    {Status::few_colours, "20 of 20 frames have no more colours than a palette"}}) {
     FrameDiagnosis diagnosis(rig);
-    for (int i = 0; i < 20; ++i) diagnosis.add(black, tracker.refuse(flaw));
+    for (int i = 0; i < 20; ++i) diagnosis.add(bright, tracker.refuse(flaw));
     EXPECT_EQ(diagnosis.text().rfind(said, 0), 0U) << diagnosis.text();
     EXPECT_EQ(diagnosis.cause(), "; " + diagnosis.text());
   }
+  FrameDiagnosis covered(rig);  // whose noise has few values
+  for (int i = 0; i < 20; ++i) covered.add(black, tracker.refuse(Status::few_colours));
+  expect_names(covered.text(), "take the cap off the lens");
   FrameDiagnosis half(rig);
   for (int i = 0; i < 20; ++i) half.add(black, i % 2 == 0 ? tracker.refuse(Status::damaged) : tracker.track(black));
-  expect_names(half.text(), "nearly black");
+  expect_names(half.text(), "the frames are dark");
 }
 
 // As a marker that is mounted the wrong way round: its axis meets the RCM at the other end.

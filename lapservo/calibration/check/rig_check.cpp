@@ -5,7 +5,9 @@
 #include <map>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include "lapservo/calibration/check/usual_cause.h"
 #include "lapservo/calibration/registration/axes_meeting_point.h"
 #include "lapservo/calibration/registration/registration.h"
 #include "lapservo/core/angles.h"
@@ -59,7 +61,8 @@ class Advisor {
   explicit Advisor(const RigFindings& findings) : f_(findings) {}
 
   std::vector<Advice> all() {
-    light(), colours(), response(), camera(), print(), movement(), joints(), delay(), registration(), found(), view();
+    light(), colours(), compression(), response(), camera(), print(), movement(), joints(), delay(), registration();
+    view(), found();
     std::stable_sort(advice_.begin(), advice_.end(),
                      [](const Advice& a, const Advice& b) { return a.needed > b.needed; });
     return std::move(advice_);
@@ -72,14 +75,15 @@ class Advisor {
 
   bool dark() const {
     return f_.light ? f_.light->value < rig_limits.dark_value || f_.light->chroma < rig_limits.dark_chroma
-                    : f_.picture.value < rig_limits.dark_picture;
+                    : f_.picture.dark();
   }
-  bool clipped() const {
-    return f_.light ? f_.light->clipped > rig_limits.clipped : f_.picture.clipped > rig_limits.clipped_picture;
-  }
+  bool clipped() const { return f_.light ? f_.light->clipped > rig_limits.clipped : f_.picture.overexposed(); }
   bool seldom_found() const { return f_.found < rig_limits.found * static_cast<double>(f_.frames); }
   std::string found_text() const {
-    return fmt::format("the marker is found in {} of {} frames, else mostly {}", f_.found, f_.frames, f_.failure);
+    const std::string found = fmt::format("the marker is found in {} of {} frames", f_.found, f_.frames);
+    if (f_.failure == Status::ok) return found;
+    return fmt::format("{}, else mostly {}{}", found, to_string(f_.failure),
+                       f_.cause.empty() ? fmt::format(": {}", usual_cause(f_.failure)) : "");
   }
 
   void light() {
@@ -102,11 +106,16 @@ class Advisor {
     if (f_.light && f_.hue_error_deg > rig_limits.hue_deg)
       add(true, fmt::format("the bands' hues are {:.0f} degrees from the rig's", f_.hue_error_deg),
           "lapservo calibrate colour", "the marker is found where its colours are near the limit now");
-    if (f_.light || clipped() || dark()) return;
-    const bool known = !f_.cause.empty();
-    add(true, found_text() + (known ? f_.cause : ": its colours are not the image's"),
-        known ? "mend that, and record again" : "lapservo calibrate colour",
-        known ? "finding it at all" : "finding it at all; look at diameter_m too, and whether the marker is in view");
+    if ((f_.light && f_.cause.empty()) || clipped() || dark()) return;
+    add(true, found_text() + f_.cause, "mend that, and record again where it was the recording", "finding it at all");
+  }
+
+  void compression() {
+    if (f_.lossy && seldom_found() && comes_by_compression(f_.failure))
+      add(true,
+          fmt::format("the recording is compressed, and the marker is found in {} of {} frames, else mostly {}",
+                      f_.found, f_.frames, to_string(f_.failure)),
+          "record without losses or at a higher bit rate", "the frames that are refused now");
   }
 
   void response() {
@@ -150,7 +159,7 @@ class Advisor {
                       print.before_px, 1e3 * print.psi_rad.value),
           "lapservo calibrate marker",
           fmt::format("psi: {:.1f} mrad rms less, and no marker_mismatch", 1e3 * print.psi_rad.value));
-    else if (5 * static_cast<std::size_t>(f_.mismatched) > f_.frames)
+    else if (f_.cause.empty() && 5 * static_cast<std::size_t>(f_.mismatched) > f_.frames)
       add(true,
           fmt::format("{} of {} frames are marker_mismatch: the print is not the rig's", f_.mismatched, f_.frames),
           "lapservo calibrate marker", "psi, where it is refused now");
@@ -184,7 +193,7 @@ class Advisor {
             "mrad of the axis, {:.0f} mrad about it): {}",
             arm.noise, 1e3 * place_m, 1e3 * axis_rad, 1e3 * roll_rad,
             arm.fault.empty() ? "no one fault of the joints' readings explains it" : arm.fault),
-        "mend that, record the marker and the joints again, then lapservo check",
+        "mend that; where it was the recording, record the marker and the joints again; then lapservo check",
         "the same in each pose that the joints give");
   }
 
@@ -204,30 +213,35 @@ class Advisor {
 
   void registration() {
     constexpr auto command = "lapservo calibrate registration";
+    if (f_.arm && !f_.arm->refusal.empty())
+      add(true, "joints and images can't be compared: " + f_.arm->refusal,
+          "mend that; where it was the recording, record the marker and the joints again; then lapservo check",
+          "delay, registration and focal length");
     if (!f_.registered) {
       add(true, "the rig has no camera_from_rcm", command, "theta, phi, rho, psi and r, which are unknown without");
       return;
     }
     if (f_.arm) {
-      if (!f_.arm->refusal.empty()) {
-        add(true, "joints and images can't be compared: " + f_.arm->refusal,
-            "record the marker and the joints again, then lapservo check", "delay, registration and focal length");
-        return;
-      }
+      if (!f_.arm->refusal.empty()) return;
       const ArmCheck& arm = *f_.arm;
-      if (arm.place_m->exceeds(rig_limits.place_m) || arm.axis_rad->exceeds(rig_limits.axis_rad) ||
-          arm.roll_rad->exceeds(rig_limits.roll_rad))
+      const bool placed = !arm.place_m->exceeds(rig_limits.place_m) && !arm.axis_rad->exceeds(rig_limits.axis_rad);
+      if (!placed || arm.roll_rad->exceeds(rig_limits.roll_rad))
         add(true,
             fmt::format("the registration puts the marker {:.1f} mm, {:.0f} mrad (axis), {:.0f} mrad (about it) from "
-                        "where it is",
-                        1e3 * arm.place_m->value, 1e3 * arm.axis_rad->value, 1e3 * arm.roll_rad->value),
+                        "where it is: {}",
+                        1e3 * arm.place_m->value, 1e3 * arm.axis_rad->value, 1e3 * arm.roll_rad->value,
+                        !arm.other_signs.empty()
+                            ? fmt::format("the sign of {} is the other", fmt::join(arm.other_signs, " and "))
+                        : placed ? "the marker, or the zero of the roll's joint, was turned about the shaft"
+                                 : "the endoscope or the arm's base was moved, or a joint's zero is another"),
             std::string(command) + " --joints", fmt::format("as much: {:.1f} mm", 1e3 * arm.place_m->value));
       return;
     }
     if (!f_.rcm) return;
     if (!f_.rcm->refusal.empty())
       add(f_.rcm->refusal == reversed_marker, "whether the RCM is right is unknown: " + f_.rcm->refusal,
-          "record a swing, then lapservo check", "an RCM that is off bends every pose");
+          f_.rcm->refusal == reversed_marker ? "mount the marker anew" : "record a swing, then lapservo check",
+          "an RCM that is off bends every pose");
     else if (f_.rcm->distance_m && f_.rcm->distance_m->exceeds(2 * rig_limits.place_m))
       add(true,
           fmt::format("the axes meet {:.1f} mm from the rig's RCM (sigma {:.1f} mm)", 1e3 * f_.rcm->distance_m->value,
@@ -303,9 +317,9 @@ RigFindings findings_of(const Rig& rig, std::size_t instrument, const RigEvidenc
   for (const FrameEvidence& frame : frames)
     if (frame.status != Status::ok) ++failures[frame.status];
   if (!failures.empty())
-    findings.failure = to_string(std::max_element(failures.begin(), failures.end(), [](const auto& a, const auto& b) {
-                                   return a.second < b.second;
-                                 })->first);
+    findings.failure = std::max_element(failures.begin(), failures.end(), [](const auto& a, const auto& b) {
+                         return a.second < b.second;
+                       })->first;
   findings.picture = evidence.picture();
   findings.light = typical_light(frames);
   findings.width_px = median_over(frames, [](const FrameEvidence& f) { return f.width_px; });

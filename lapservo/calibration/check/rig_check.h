@@ -44,7 +44,7 @@ struct RigFindings {
   std::size_t frames = 0;
   int found = 0, mismatched = 0;  ///< frames
   std::string cause;              ///< of frames in which it is not found: FrameDiagnosis::cause()
-  std::string failure;            ///< the status that is most frequent of those that are not ok; empty when all are
+  Status failure = Status::ok;    ///< the most frequent of those that are not ok, if any
   PictureLight picture;
   std::optional<MarkerLight> light;  ///< medians; empty when no frame shows the marker
   double hue_error_deg = 0;          ///< the largest of the three bands'

@@ -7,7 +7,6 @@
 
 #include "lapservo/core/statistics.h"
 #include "lapservo/geometry/rotation.h"
-#include "lapservo/vision/image/light_image.h"
 
 namespace lapservo::internal {
 namespace {
@@ -83,21 +82,6 @@ bool RigEvidence::look_with(FreeTrackers& trackers, const cv::Mat& bgr, double t
   return true;
 }
 
-void RigEvidence::look_at_picture(const cv::Mat& bgr) {
-  constexpr int every = 16;  // pixels
-  std::vector<int> brightest;
-  int clipped = 0;
-  for (int v = every / 2; v < bgr.rows; v += every)
-    for (int u = every / 2; u < bgr.cols; u += every) {
-      const auto& pixel = bgr.at<cv::Vec3b>(v, u);
-      brightest.push_back(std::max({pixel[0], pixel[1], pixel[2]}));
-      clipped += brightest.back() >= LightImage::saturated_value;
-    }
-  if (brightest.empty()) return;
-  clipped_.push_back(static_cast<double>(clipped) / static_cast<double>(brightest.size()));
-  values_.push_back(quantile(brightest, 0.9));
-}
-
 FrameEvidence RigEvidence::tracked_as_it_is(const cv::Mat& bgr, double time_s) {
   const Observation& seen = as_it_is_.track(bgr)[instrument_];
   FrameEvidence frame{time_s, seen.status, seen.marker ? seen.marker->sigma_roll_rad : 0, {}, {}, 0};
@@ -114,7 +98,7 @@ bool RigEvidence::add(const cv::Mat& bgr, double time_s) {
     key_frames_.add(bgr, time_s);
     return tracked_as_it_is(bgr, time_s);
   });
-  look_at_picture(bgr);
+  pictures_.push_back(light_of_picture(bgr));
   FreeSight free;
   const bool found = look_with(exact_, bgr, time_s, free) || look_with(tolerant_, bgr, time_s, free);
   unfinished_.push_back({std::move(as_it_is), free});
@@ -160,8 +144,10 @@ std::vector<TrackedPsi> RigEvidence::tracked_psi() const {
 
 PictureLight RigEvidence::picture() const {
   finish_all_but(0);
-  if (values_.empty()) return {};
-  return {median(std::vector(values_)), median(std::vector(clipped_))};
+  if (pictures_.empty()) return {};
+  std::vector<double> values, clipped;
+  for (const PictureLight& light : pictures_) values.push_back(light.value), clipped.push_back(light.clipped);
+  return {median(values), median(clipped)};
 }
 
 int RigEvidence::count(Status status) const {

@@ -12,6 +12,7 @@
 #include "lapservo/calibration/colour/band_samples.h"
 #include "lapservo/calibration/colour/marker_response.h"
 #include "lapservo/calibration/marker/marker_calibration.h"
+#include "lapservo/calibration/recording/picture_light.h"
 #include "lapservo/calibration/registration/timed_pose.h"
 #include "lapservo/core/workers.h"
 #include "lapservo/rig/rig.h"
@@ -27,12 +28,6 @@ struct FrameEvidence {
   std::optional<double> psi_rad{};   ///< when ok and the rig has camera_from_rcm
   std::optional<MarkerLight> light;  ///< where the marker was found, be its print the rig's or not
   double width_px = 0;               ///< of the shaft, there
-};
-
-/// The whole frame by encoded values: what is left to say when no marker is found.
-struct PictureLight {
-  double value = 0;    ///< median over frames of the 90th percentile of the brightest channel, of 255
-  double clipped = 0;  ///< median over frames of the fraction with a saturated channel
 };
 
 /// Passes a recording's frames through all measurements that test the rig.
@@ -53,7 +48,7 @@ class RigEvidence {
   std::vector<TrackedPsi> tracked_psi() const;
   /// Nullopt when the marker's edges are too few.
   std::optional<MarkerResponse::Result> response() const;
-  PictureLight picture() const;
+  PictureLight picture() const;  ///< medians
   int count(Status status) const;
   /// Empties what it takes.
   std::vector<KeyFrame> take_key_frames();
@@ -78,7 +73,6 @@ class RigEvidence {
   // Whether the marker was found.
   bool look_with(FreeTrackers& trackers, const cv::Mat& bgr, double time_s, FreeSight& sight);
   void look_at_light(const cv::Mat& bgr, const Observation& seen, FreeSight& sight);
-  void look_at_picture(const cv::Mat& bgr);
   FrameEvidence tracked_as_it_is(const cv::Mat& bgr, double time_s);
   void finish_all_but(std::size_t unfinished) const;
 
@@ -89,7 +83,7 @@ class RigEvidence {
   KeyFrames key_frames_;
   MarkerResponse response_;
   std::vector<TimedPose> poses_;
-  std::vector<double> values_, clipped_;
+  std::vector<PictureLight> pictures_;
   // When they are finished changes nothing that can be seen.
   mutable std::vector<FrameEvidence> frames_;
   mutable std::deque<Unfinished> unfinished_;

@@ -224,7 +224,7 @@ std::string refusal_of(const MeasuredHues& measured, std::size_t frames, const s
   if (2 * static_cast<std::size_t>(measured.found) < frames)
     return fmt::format(
         "with the hues that suit best {} is in {} of {} frames: show it wholly, near, lit and in motion; "
-        "diameter_m and bands must be the rig's to half a millimetre",
+        "the rig's hues_deg may be 60 degrees off, its diameter_m and bands half a millimetre",
         name, measured.found, frames);
   if (measured.clipped > max_clipped)
     return fmt::format(

@@ -31,8 +31,9 @@ MarkerMeasurement measure_marker(const Rig& rig, std::size_t index, const FrameR
   MarkerMeasurement measured;
   measured.read =
       read_frames(recording, rig, every_of(recording.source, enough), watch, [&](const cv::Mat& bgr, double time_s) {
+        const int before = key_frames.found();
         key_frames.add(bgr, time_s);
-        if (key_frames.found() == 0) diagnosis.add(bgr, {});
+        if (key_frames.found() == before) diagnosis.add(bgr, {});
         return fmt::format(", {} in {}", instrument.name, key_frames.found());
       });
   measured.found = key_frames.found();
@@ -47,6 +48,8 @@ MarkerMeasurement measure_marker(const Rig& rig, std::size_t index, const FrameR
     watch.tell(std::nullopt, round, fmt::format(" of at most {} rounds of fitting", most));
   };
   measured.calibration = calibrate_marker(rig, index, key_frames.take(), progress, watch.is_stopped);
+  if (!measured.calibration.refusal.empty() && 2 * measured.found < measured.read.looked_at && !watch.stopped())
+    measured.calibration.refusal += diagnosis.cause();
   if (measured.read.jpegs == measured.read.looked_at) measured.calibration.seam_may_lag = false;
   if (joints && measured.calibration.refusal.empty()) add_seam(instrument, *joints, measured.calibration);
   return measured;

@@ -4,15 +4,22 @@
 
 #include <fmt/format.h>
 
+#include "lapservo/calibration/recording/picture_light.h"
 #include "lapservo/core/error.h"
 #include "lapservo/io/image_file.h"
 #include "lapservo/vision/image/interlacing.h"
 
 namespace lapservo::internal {
 
+void FlawedFrames::add(Status flaw, const cv::Mat& bgr) {
+  ++(flaw == Status::few_colours ? few_colours : damaged);
+  dark += flaw == Status::few_colours && light_of_picture(bgr).dark() ? 1 : 0;
+}
+
 std::string FlawedFrames::text(int frames) const {
   if (damaged >= few_colours)
     return fmt::format("{} of {} frames are damaged: repair what carries them, or record them again", damaged, frames);
+  if (2 * dark > few_colours) return dark_pictures;
   return fmt::format("{} of {} frames have no more colours than a palette: record them in true colour, not indexed",
                      few_colours, frames);
 }
@@ -42,7 +49,7 @@ FramesRead read_frames(const FrameRecording& recording, const Rig& rig, int ever
     check_frame_size(*frame, recording.name, {rig.camera.width_px, rig.camera.height_px}, "the rig's camera");
     if (read++ % every != 0) continue;
     if (frame->flaw) {
-      frames.flawed.add(*frame->flaw);
+      frames.flawed.add(*frame->flaw, frame->bgr);
       continue;
     }
     ++frames.looked_at;

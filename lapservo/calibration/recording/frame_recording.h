@@ -33,8 +33,9 @@ struct JobWatch {
 /// Frames in which nothing is to be measured: see Frame::flaw.
 struct FlawedFrames {
   int damaged = 0, few_colours = 0;
+  int dark = 0;  ///< of few_colours: such a frame shows nothing that has colours
 
-  void add(Status flaw) { ++(flaw == Status::few_colours ? few_colours : damaged); }
+  void add(Status flaw, const cv::Mat& bgr);
   int all() const { return damaged + few_colours; }
   /// How many of so many frames they are, the cause and its remedy; of the more frequent flaw.
   std::string text(int frames) const;

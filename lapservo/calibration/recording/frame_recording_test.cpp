@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include "lapservo/calibration/recording/picture_light.h"
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/scenes.h"
 
@@ -15,11 +16,11 @@ namespace {
 
 class EvenFrames : public FrameSource {
  public:
-  EvenFrames(const cv::Size& size, int count) : size_(size), count_(count) {}
+  EvenFrames(const cv::Size& size, int count, int value = 10) : size_(size), count_(count), value_(value) {}
   std::optional<Frame> next() override {
     if (shown_ == count_) return std::nullopt;
     Frame frame;
-    frame.bgr = cv::Mat(size_, CV_8UC3, cv::Scalar::all(10 + shown_));
+    frame.bgr = cv::Mat(size_, CV_8UC3, cv::Scalar::all(value_ + shown_));
     frame.index = shown_++;
     return frame;
   }
@@ -29,7 +30,7 @@ class EvenFrames : public FrameSource {
 
  private:
   cv::Size size_;
-  int count_, shown_ = 0;
+  int count_, value_, shown_ = 0;
 };
 
 // `check` looks at frames some frames later in another thread.
@@ -52,8 +53,8 @@ TEST(FrameRecording, FramesThatWereShownStayAsTheyAre) {
 
 class FlawedSource : public EvenFrames {
  public:
-  FlawedSource(const cv::Size& size, std::vector<Status> flaws)
-      : EvenFrames(size, static_cast<int>(flaws.size())), flaws_(std::move(flaws)) {}
+  FlawedSource(const cv::Size& size, std::vector<Status> flaws, int value)
+      : EvenFrames(size, static_cast<int>(flaws.size()), value), flaws_(std::move(flaws)) {}
   std::optional<Frame> next() override {
     auto frame = EvenFrames::next();
     if (frame && flaws_[static_cast<std::size_t>(frame->index)] != Status::ok)
@@ -67,8 +68,8 @@ class FlawedSource : public EvenFrames {
 
 TEST(FrameRecording, OfFlawedFramesAloneIsRefused) {
   const Rig rig = scenes::usual_rig();
-  const auto said = [&](const std::vector<Status>& flaws) {
-    FlawedSource source({rig.camera.width_px, rig.camera.height_px}, flaws);
+  const auto said = [&](const std::vector<Status>& flaws, int value = 100) {
+    FlawedSource source({rig.camera.width_px, rig.camera.height_px}, flaws, value);
     return testing::input_error([&] {
       read_frames({source, "frames"}, rig, 1, {}, [](const cv::Mat&, double) { return ""; });
     });
@@ -77,6 +78,8 @@ TEST(FrameRecording, OfFlawedFramesAloneIsRefused) {
             "frames: 4 of 4 frames are damaged: repair what carries them, or record them again");
   EXPECT_EQ(said({Status::few_colours, Status::damaged, Status::few_colours}),
             "frames: 2 of 3 frames have no more colours than a palette: record them in true colour, not indexed");
+  EXPECT_EQ(said({Status::few_colours, Status::damaged, Status::few_colours}, 3),
+            std::string("frames: ") + dark_pictures);
   EXPECT_EQ(said({Status::few_colours, Status::ok, Status::damaged}), "");
 }
 

@@ -36,6 +36,14 @@ void refuse_apart(const std::vector<TimedPose>& poses, const JointRecording& rec
                                first_s, last_s, recording.time_s.front(), recording.time_s.back()));
 }
 
+std::string clocks_text(const std::vector<TimedPose>& poses, const JointRecording& recording) {
+  const double frames_s = poses.back().time_s - poses.front().time_s,
+               joints_s = recording.time_s.back() - recording.time_s.front();
+  return fmt::format("frames from {:.1f} to {:.1f} s, joints from {:.1f} to {:.1f} s{}", poses.front().time_s,
+                     poses.back().time_s, recording.time_s.front(), recording.time_s.back(),
+                     joints_s > 100 * frames_s ? ": time_s looks like milliseconds" : "");
+}
+
 }  // namespace
 
 std::string too_few_poses(std::size_t poses) {
@@ -62,9 +70,11 @@ ArmStart start_arm(const Instrument& instrument, const std::vector<TimedPose>& p
 
   constexpr double least_explained = 0.5, max_misfit_rad = 0.1;
   const auto foreign = [&](const std::string& how) {
-    start.refusal = "the joints do not move as the marker does (" + how +
-                    "): is it this arm's recording, are names in the order theta, phi, rho, psi, do both clocks run "
-                    "within 3 s of each other";
+    start.refusal = fmt::format(
+        "the joints do not move as the marker does ({}): is it this arm's recording, are names in the order theta, "
+        "phi, "
+        "rho, psi, do both clocks run within 3 s of each other ({})",
+        how, clocks_text(poses, recording));
     return start;
   };
   const DelaySearch search = search_delay(poses, rho_m, recording, about_s, largest_delay_s);

@@ -23,8 +23,8 @@ struct RcmMeasurement {
 /// What a rig knows of where an instrument's RCM frame is.
 struct RcmPrior {
   Rigid3 camera_from_rcm;
-  /// Covariance of the translation [m], then of a rotation vector about the camera's axes [rad]. Zero of a registration that
-  /// counts as exact.
+  /// Covariance of the translation [m], then of a rotation vector about the camera's axes [rad]. Zero of a registration
+  /// that counts as exact.
   RegistrationMatrix covariance = RegistrationMatrix::Zero();
 
   /// The distances count as known to `least_sigma_m` at best: a rough pose is held at the RCM as well as it is known.

@@ -1,7 +1,9 @@
+#include <cmath>
 #include <cstdio>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -35,6 +37,22 @@ void print_table(const std::vector<CalibratedNumber>& numbers) {
                 n.after - n.before);
 }
 
+// Where all bands are longer or shorter by the same part.
+void print_scale(const Marker& before, const Marker& after) {
+  const double scale = after.length_m() / before.length_m();
+  bool alike = std::abs(scale - 1) > 0.01;
+  for (const auto& [was, is] :
+       {std::pair{before.bands_upper_m, after.bands_upper_m}, {before.bands_lower_m, after.bands_lower_m}})
+    for (std::size_t i = 0; i < was.size(); ++i)
+      alike &= std::abs(is[i] / was[i] - scale) < 0.3 * std::abs(scale - 1) + 1e-4 / was[i];
+  if (alike)
+    std::printf(
+        "all bands are %.1f %% %s than the rig's: the printer scaled the sheet, or diameter_m is as much too %s: "
+        "measure "
+        "the print's length and the shaft's diameter by callipers\n",
+        100 * std::abs(scale - 1), scale > 1 ? "longer" : "shorter", scale > 1 ? "large" : "small");
+}
+
 }  // namespace
 
 int calibrate_marker(const CalibrateOptions& options) {
@@ -59,6 +77,7 @@ int calibrate_marker(const CalibrateOptions& options) {
   std::printf("\nboundaries miss the print by %.3f px rms before, %.3f px after\n", calibration.before_px,
               calibration.after_px);
   print_faults(calibration.faults);
+  print_scale(instrument.marker, calibration.marker);
   std::printf(
       "diameter_m is the rig's (%.3f mm): images give lengths in diameters; a smaller shaft nearer by looks the same\n",
       1e3 * instrument.marker.diameter_m);

@@ -86,7 +86,7 @@ class Watcher : public RunObserver {
  private:
   // False when it ends the run.
   bool obey_page(const ControlTick& tick, const std::string& state) {
-    page_->tell(tick, tick.input.time_s, state);
+    page_->tell(tick, tick.input.time_s, state, arm_.can_start());
     return !page_->command(arm_, tick.input.time_s);
   }
 

@@ -104,7 +104,7 @@ class ArmWatcher : public RunObserver {
  private:
   // True when it ends the run.
   bool obey_page(const ControlTick& tick, double time_s) {
-    page_->tell(tick, time_s, state_);
+    page_->tell(tick, time_s, state_, arm_.can_start());
     const bool ends = page_->command(arm_, tick.input.time_s);
     if (ends) say(time_s, "end: requested on the page");
     return ends;

@@ -42,6 +42,8 @@ ControllerConfig controller_of(const ServoOptions& options, const Rig& rig) {
   if (options.delay != "estimate") {
     const auto delay_ms = parse_finite(options.delay);
     if (!delay_ms) throw InputError("--delay-ms", "is " + options.delay + ", expected milliseconds or `estimate`");
+    if (*delay_ms > 0 && *delay_ms < 1)
+      throw InputError("--delay-ms", "is " + options.delay + ", expected milliseconds: it looks like seconds");
     config.observer.delay_s = *delay_ms / 1000;
   }
   if (!options.joint_limits.empty()) config.limits = limits_of(options, rig);

@@ -34,7 +34,7 @@ PageLoop loop_of(const ControlTick& tick, double time_s) {
 ServoPage::ServoPage(const ServoOptions& options, const Rig& rig, const std::string& title, bool may_start)
     : web_(options.web, config_of(options, title, may_start)), rig_(std::make_shared<const Rig>(rig)) {}
 
-void ServoPage::tell(const ControlTick& tick, double time_s, const std::string& state) {
+void ServoPage::tell(const ControlTick& tick, double time_s, const std::string& state, bool can_start) {
   if (tick.decision.registration != registration_) {
     Rig now = *rig_;
     now.instruments.front().camera_from_rcm = tick.decision.camera_from_rcm;
@@ -43,7 +43,9 @@ void ServoPage::tell(const ControlTick& tick, double time_s, const std::string& 
   }
   if (tick.seen)
     web_.show({tick.seen->image.bgr, rig_, tick.seen->observations, tick.input.time_s - tick.seen->image.time_s});
-  web_.tell(loop_of(tick, time_s), state);
+  PageLoop loop = loop_of(tick, time_s);
+  loop.can_start = can_start;
+  web_.tell(loop, state);
 }
 
 bool ServoPage::command(Supervisor& arm, double now_s) {

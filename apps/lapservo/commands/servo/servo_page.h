@@ -18,7 +18,7 @@ class ServoPage {
   ServoPage(const ServoOptions& options, const Rig& rig, const std::string& title, bool may_start);
 
   /// `state`: in words.
-  void tell(const ControlTick& tick, double time_s, const std::string& state);
+  void tell(const ControlTick& tick, double time_s, const std::string& state, bool can_start);
   /// Passes the page's commands on; true when one ends the run.
   bool command(Supervisor& arm, double now_s);
   /// The page's run button.

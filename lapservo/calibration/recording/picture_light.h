@@ -1,0 +1,24 @@
+#pragma once
+
+#include <opencv2/core.hpp>
+
+namespace lapservo::internal {
+
+/// A whole frame by encoded values: what can be said of its light where no marker is found.
+struct PictureLight {
+  double value = 0;    ///< 90th percentile of the brightest channel, of 255
+  double clipped = 0;  ///< fraction of the pixels with a saturated channel
+
+  bool dark() const { return value < 40; }
+  bool overexposed() const { return clipped > 0.25; }
+};
+
+/// Where all frames are dark: cause and remedy.
+inline constexpr auto dark_pictures =
+    "the frames are dark: take the cap off the lens, raise the light or the exposure; 16-bit images that hold 8 to 12 "
+    "bits are to be scaled to the whole range";
+
+/// The light of an 8-bit BGR image; zeros where it is smaller than 9 x 9.
+PictureLight light_of_picture(const cv::Mat& bgr);
+
+}  // namespace lapservo::internal
