@@ -40,7 +40,7 @@ struct Picture {
 Picture read_picture(const std::filesystem::path& path);
 Picture decode_picture(std::span<const std::uint8_t> bytes, const std::string& source);
 
-/// The same for images that must be without flaw: else InputError.
+/// The same of images whose decoder does not complain: else InputError.
 cv::Mat read_image(const std::filesystem::path& path);
 cv::Mat decode_image(std::span<const std::uint8_t> bytes, const std::string& source);
 

@@ -38,6 +38,12 @@ Eigen::Matrix<double, 6, 6> registration_covariance(const Instrument& instrument
   return covariance;
 }
 
+std::string exact_registration_text(const Instrument& instrument) {
+  if (!instrument.camera_from_rcm || !registration_covariance(instrument).isZero()) return "";
+  return instrument.name +
+         ": camera_from_rcm has no standard deviations and counts as exact: q's are the frame's alone";
+}
+
 Eigen::Matrix<double, 6, 6> in_camera_axes(const Rigid3& camera_from_rcm,
                                            const Eigen::Matrix<double, 6, 6>& of_rotation_and_translation) {
   Eigen::Matrix<double, 6, 6> from_own = Eigen::Matrix<double, 6, 6>::Zero();

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <string>
+
 #include <Eigen/Core>
 
 #include "lapservo/rig/rig.h"
@@ -10,7 +12,10 @@ namespace lapservo::internal {
 /// else by its sigmas, which know no correlations; zero of what it has none of.
 Eigen::Matrix<double, 6, 6> registration_covariance(const Instrument& instrument);
 
-/// The same of a covariance of a rotation about the RCM frame's own axes, then of the translation.
+/// One line where camera_from_rcm counts as exact, since the rig has no standard deviations of it; else empty.
+std::string exact_registration_text(const Instrument& instrument);
+
+/// registration_covariance() of a covariance of a rotation about the RCM frame's own axes, then of the translation.
 Eigen::Matrix<double, 6, 6> in_camera_axes(const Rigid3& camera_from_rcm,
                                            const Eigen::Matrix<double, 6, 6>& of_rotation_and_translation);
 

@@ -457,5 +457,20 @@ TEST(Rig, OfALensThatFoldsInTheCornersAloneIsTaken) {
   EXPECT_TRUE(rig.camera.ideal_from_raw({639.5, 0}));
 }
 
+// As calibrate registration writes it, and as ROS orders it.
+TEST(Rig, HoldsTheRegistrationsCovariance) {
+  const auto text = [](const std::string& number) {
+    std::string numbers;
+    for (int i = 0; i < 36; ++i)
+      numbers += (i ? ", " : "") + (i == 6 ? number : i % 7 == 0 ? "1e-6" : i == 1 ? "5e-7" : "0");
+    return with("    camera_from_rcm:\n",
+                "    camera_from_rcm:\n      covariance: {rows: 6, cols: 6, data: [" + numbers + "]}\n");
+  };
+  const Rig rig = parse_rig(text("5e-7"), "rig.yaml");
+  ASSERT_TRUE(rig.instruments[0].registration_covariance);
+  EXPECT_EQ((*rig.instruments[0].registration_covariance)(0, 1), 5e-7);
+  EXPECT_THROW(parse_rig(text("4e-7"), "rig.yaml"), InputError) << "not symmetric";
+}
+
 }  // namespace
 }  // namespace lapservo::internal

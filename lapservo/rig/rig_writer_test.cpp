@@ -2,6 +2,7 @@
 
 #include <array>
 #include <filesystem>
+#include <limits>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -123,9 +124,15 @@ void change_registration(Random& random, Instrument& instrument) {
       {random.uniform(-1, 1), 1.0 / 3, -0.0}};
   instrument.sigma_translation_m = random_sigmas<3>(random);
   if (some()) instrument.sigma_quaternion_xyzw.reset();
+  if (some()) {
+    Eigen::Matrix<double, 6, 6> root;
+    for (double& number : root.reshaped()) number = 1e-3 * random.normal();
+    const Eigen::Matrix<double, 6, 6> square = root * root.transpose();
+    instrument.registration_covariance = (square + square.transpose()) / 2;
+  }
   if (some())
     instrument.camera_from_rcm.reset(), instrument.sigma_translation_m.reset(),
-        instrument.sigma_quaternion_xyzw.reset();
+        instrument.sigma_quaternion_xyzw.reset(), instrument.registration_covariance.reset();
   instrument.joints->offset = {0, 1.0 / 3, -0.0, random.normal()};
   if (some()) instrument.joints->sigma_offset.reset();
   if (some()) instrument.joints.reset();
@@ -164,6 +171,14 @@ TEST(RigWriter, NamesACamerasFileFromWhereverTheRigGoes) {
     EXPECT_EQ(moved.instruments, rig.instruments) << place;
   }
   EXPECT_EQ(rig_yaml(rig), every_key) << "on its own";
+}
+
+TEST(RigWriter, ARigThatNoFileMayHoldIsRefused) {
+  Rig rig = parse_rig(every_key, "rig.yaml");
+  check_rig(rig);
+  rig.camera.fx_px = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THROW(check_rig(rig), InputError);
+  EXPECT_THROW(check_rig(Rig{}), InputError);
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "lapservo/control/delay_estimator.h"
 #include "lapservo/servo/image_features.h"
 
 namespace lapservo::internal {
@@ -53,12 +54,21 @@ bool orderly(const ControlStep& control) {
   return control.has_setpoint && control.setpoint.position.allFinite() && control.setpoint.velocity.allFinite();
 }
 
+// The delay that a calibration measured is where its estimate begins.
+ControllerConfig with_delay_of(const Instrument& instrument, ControllerConfig config) {
+  constexpr double longest_s = DelayEstimator::step_s * (DelayEstimator::candidates - 1);
+  const double delay_s = instrument.image_delay_s.value_or(-1);
+  if (delay_s >= 0 && delay_s <= longest_s) config.observer.initial_delay_s = delay_s;
+  return config;
+}
+
 }  // namespace
 
 Servo::Servo(const ControllerConfig& config, FeatureModel model)
     : controller_(config, model), registered_(model != nullptr) {}
 
-Servo::Servo(const ControllerConfig& config, const Rig& rig) : Servo(config, feature_model(rig)) {
+Servo::Servo(const ControllerConfig& config, const Rig& rig)
+    : Servo(with_delay_of(rig.instruments.front(), config), feature_model(rig)) {
   if (rig.instruments.front().joints) names_ = rig.instruments.front().joints->names;
   camera_from_rcm_ = rig.instruments.front().camera_from_rcm;
   if (config.mode == ControlMode::fused) recovery_.emplace(rig);

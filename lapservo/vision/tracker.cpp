@@ -5,6 +5,7 @@
 
 #include "lapservo/core/error.h"
 #include "lapservo/core/words.h"
+#include "lapservo/rig/rig_writer.h"
 #include "lapservo/vision/image/image_view.h"
 #include "lapservo/vision/image/interlacing.h"
 #include "lapservo/vision/paper/centerline.h"
@@ -26,6 +27,11 @@ void check_image(const cv::Mat& image, const Camera& camera) {
   if (image.cols != camera.width_px || image.rows != camera.height_px)
     throw InputError("image", "size", size_text(image.cols, image.rows),
                      size_text(camera.width_px, camera.height_px) + " as in the rig");
+}
+
+const Rig& checked(const Rig& rig) {
+  check_rig(rig);
+  return rig;
 }
 
 TrackerOptions checked(TrackerOptions options) {
@@ -96,7 +102,8 @@ struct Tracker::State {
   std::vector<Observation> observations;
 };
 
-Tracker::Tracker(const Rig& rig, TrackerOptions options) : state_(std::make_unique<State>(rig, checked(options))) {}
+Tracker::Tracker(const Rig& rig, TrackerOptions options)
+    : state_(std::make_unique<State>(checked(rig), checked(options))) {}
 Tracker::~Tracker() = default;
 Tracker::Tracker(Tracker&&) noexcept = default;
 Tracker& Tracker::operator=(Tracker&&) noexcept = default;

@@ -47,6 +47,7 @@ TEST(Tracker, NamesTheInstrumentWhateverBecomesOfIt) {
 TEST(Tracker, RefusesABudgetOfNothing) {
   for (const double nothing : {0.0, -1.0, std::nan("")})
     EXPECT_THROW(Tracker(scenes::usual_rig(), {.frame_budget = nothing}), InputError) << nothing;
+  EXPECT_THROW(Tracker(Rig{}), InputError) << "put together in a program";
 }
 
 }  // namespace

@@ -21,6 +21,7 @@
 #include "lapservo/calibration/check/work_space.h"
 #include "lapservo/calibration/colour/colour_calibration.h"
 #include "lapservo/io/frame_source.h"
+#include "lapservo/rig/registration_covariance.h"
 
 namespace lapservo::app {
 using namespace internal;
@@ -93,6 +94,7 @@ int check(const CalibrateOptions& options) {
     if (print.valid()) checked.findings.print = print.get();
   }
   checked.advice = advice_on(checked.findings);
+  checked.exact_registration = exact_registration_text(instrument);
   std::printf("%s\n", instrument.name.c_str());
   print(checked);
   if (!options.report.empty()) {

@@ -30,6 +30,7 @@
 #include "lapservo/io/tables/observation_csv.h"
 #include "lapservo/io/video/overlay_writer.h"
 #include "lapservo/io/video/video_encoder.h"
+#include "lapservo/rig/registration_covariance.h"
 #include "lapservo/robot/steady_clock.h"
 #include "lapservo/servo/registration_watch.h"
 #include "lapservo/vision/tracker.h"
@@ -271,6 +272,10 @@ class TrackRun {
   void tell_results() const {
     std::printf("%s%d frames%s\n", stopped_ ? "stopped after " : "", tally_.frames, tally_.text().c_str());
     tally_.print_refused();
+    if (tally_.anything())
+      for (const Instrument& instrument : rigs_.rig()->instruments)
+        if (const std::string exact = exact_registration_text(instrument); !exact.empty())
+          std::printf("  %s\n", exact.c_str());
     if (!rigs_.found().empty()) std::printf("rig: %s\n", rigs_.found().c_str());
     if (csv_) std::printf("observations: %s\n", options_.out.c_str());
     if (overlay_) std::printf("overlay: %s\n", options_.overlay.c_str());

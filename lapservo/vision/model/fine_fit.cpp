@@ -305,7 +305,7 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
   Fitter fitter(scene, light, fit);
   if (!fitter.settle() || !fitter.see_camera(expected)) return fit;
   fitter.judge(expected);
-  if (fitter.corrects_registration()) fitter.judge(expected);
+  if (fitter.corrects_registration() && fitter.see_camera(expected)) fitter.judge(expected);
   return fit;
 }
 
