@@ -325,10 +325,10 @@ TEST_F(Outputs, StandardOutputIsWrittenIntoWhereverItGoes) {
   const std::string tool = std::string(LAPSERVO_TOOL) + " track frames --out ";
   std::system((tool + "/dev/stdout >red 2>stderr").c_str());
   EXPECT_TRUE(read_file("red").starts_with("frame,time_s")) << errors();
-  EXPECT_EQ(lines_in("red"), 6) << "two rows, and what the tool says";
+  EXPECT_EQ(lines_in("red"), 7) << "two rows, and what the tool says";
   write_file("red", "old\n");
   std::system((tool + "/proc/self/fd/1 >>red 2>stderr").c_str());
-  EXPECT_EQ(lines_in("red"), 7) << "nothing that was there is lost";
+  EXPECT_EQ(lines_in("red"), 8) << "nothing that was there is lost";
   std::system((tool + "/dev/stdout 2>stderr | cat >piped").c_str());
   EXPECT_TRUE(read_file("piped").starts_with("frame,time_s"));
   std::system((tool + "closed.csv >&- 2>&-").c_str());

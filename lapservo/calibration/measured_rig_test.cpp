@@ -49,10 +49,17 @@ TEST(MeasuredRig, HoldsAnotherRegistration) {
                                        {0, 1e-3, 2e-3, 3e-3},
                                        1.0 / 9,
                                        0.00100004};
+  registration.arm->covariance.diagonal().head<6>() << Eigen::Vector3d::Constant(4e-8),
+      Eigen::Vector3d::Constant(1.0 / 3e9);
+  const Instrument measured = registered(before, registration);
+  expected.registration_covariance = measured.registration_covariance;
+  Eigen::Matrix<double, 6, 1> variances;
+  variances << Eigen::Vector3d::Constant(3.333e-10), Eigen::Vector3d::Constant(4e-8);
+  EXPECT_TRUE(measured.registration_covariance->isApprox(variances.asDiagonal().toDenseMatrix(), 1e-9));
   expected.sigma_quaternion_xyzw = {1e-4, 2e-4, 3e-4, 4e-4};
   expected.joints = registration.arm->joints, expected.joints->sigma_offset = registration.arm->sigma_offset;
   expected.image_delay_s = 1.0 / 9, expected.sigma_image_delay_s = 0.001;
-  EXPECT_EQ(registered(before, registration), expected);
+  EXPECT_EQ(measured, expected);
 }
 
 TEST(MeasuredRig, HoldsAnotherCamera) {

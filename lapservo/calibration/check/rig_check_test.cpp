@@ -116,7 +116,7 @@ TEST(RigEvidence, SearchesEachPictureWhole) {
 // With a misprinted marker, so that all of the trackers have something to do.
 TEST(RigEvidence, IsTheSameFromOneCoreAndFromTwo) {
   Rig rig = true_rig();
-  rig.instruments[0].marker.bands_upper_m[0] += 0.05e-3;
+  rig.instruments[0].marker.bands_upper_m[0] += 0.05e-3, rig.instruments[0].marker.bands_upper_m[1] -= 0.05e-3;
   RigEvidence by_one(rig, 0, RigEvidence::Cores::one), by_two(rig, 0, RigEvidence::Cores::two);
   const std::vector<cv::Mat> pictures = rendered(12, {});
   for (std::size_t i = 0; i < pictures.size(); ++i)

@@ -41,7 +41,7 @@ std::vector<ViewMeasurements> passing(const std::vector<ViewMeasurements>& seen,
       if (!passed.seam) continue;
       for (auto* edge : {&passed.seam->upper, &passed.seam->lower}) {
         if (!*edge) continue;
-        const double by_psi = (*edge)->row[(*edge)->row.size() - 1];
+        const double by_psi = (*edge)->row[psi_unknown];
         (*edge)->residual_px -= by_psi * turned_rad > 0 ? lag_px : -lag_px;
       }
     }

@@ -75,8 +75,7 @@ class Fitter {
   bool settle();
   bool see_camera(const Expected& expected);
   void judge(const Expected& expected);
-  // Held at the RCM, or let go of it, as the image says.
-  bool corrects_registration();
+  bool settles_by_rcm();
 
  private:
   static constexpr Effort capture{5, 5, 3, 3}, approach{4, 4, 6, 3}, measure_all{2, 0, 1, 1};
@@ -104,6 +103,7 @@ class Fitter {
   const LightImage& light_;
   FineFit& fit_;
   double film_m_ = film_mean_m;
+  PoseUnknowns settled_;  // of the passes, before the print is told
   EdgeMeasurements pass_;
   EdgeBlur located_with_;
   std::optional<ProcessedEdges> processed_;
@@ -203,10 +203,14 @@ void Fitter::judge(const Expected& expected) {
   const ResidualLines lines = residual_lines(pass_.all);
   const auto tau_rad = facing_tau_rad(scene_.marker, fit_.unknowns.pose());
   const bool is_known = tau_rad && scene_.known_sides[print_side(*tau_rad)];
-  const bool through_rcm = fit_.unknowns.through_rcm();
-  const auto print =
-      fit_print(pass_.all, lines, rcm(), through_rcm, film_prior(), scene_.marker, is_known, errors_of(lines));
+  count_inliers();
+  std::optional<RcmBesideFit> beside;
+  if (const auto measurement = rcm())
+    beside = RcmBesideFit{*measurement, fit_.unknowns.through_rcm(), fit_.is_well_seen()};
+  const auto print = fit_print(pass_.all, lines, beside, film_prior(), scene_.marker, is_known, errors_of(lines));
   if (!print) return;
+  settled_ = fit_.unknowns;
+  fit_.unknowns = fit_.unknowns.with_rcm(print->through_rcm);
   fit_.as_the_rig_says = fit_.unknowns.changed_by(print->step_as_the_rig_says.head<pose_unknowns>());
   fit_.unknowns = fit_.unknowns.changed_by(print->step.head<pose_unknowns>());
   count_inliers();
@@ -252,11 +256,11 @@ std::array<double, 4> Fitter::departure_px() const {
   return doubt_px;
 }
 
-bool Fitter::corrects_registration() {
-  if (!scene_.registration || !fit_.converged) return false;
-  const bool contradicted = fit_.is_well_seen() && fit_.rcm_missed_sigmas > fine_fit_limits.contradicted_sigmas;
-  if (contradicted != fit_.unknowns.through_rcm()) return false;
-  fit_.unknowns = fit_.unknowns.with_rcm(!contradicted);
+// Passes that held the shaft at an RCM which lies elsewhere, or not at one that does not, ended elsewhere.
+bool Fitter::settles_by_rcm() {
+  const bool through_rcm = fit_.unknowns.through_rcm();
+  if (!fit_.converged || settled_.through_rcm() == through_rcm) return false;
+  fit_.unknowns = settled_.with_rcm(through_rcm);
   fit_.converged = false;
   return refine_until_settled(1);
 }
@@ -305,7 +309,7 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
   Fitter fitter(scene, light, fit);
   if (!fitter.settle() || !fitter.see_camera(expected)) return fit;
   fitter.judge(expected);
-  if (fitter.corrects_registration() && fitter.see_camera(expected)) fitter.judge(expected);
+  if (fitter.settles_by_rcm() && fitter.see_camera(expected)) fitter.judge(expected);
   return fit;
 }
 

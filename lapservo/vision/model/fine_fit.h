@@ -26,7 +26,6 @@ struct FineFitLimits {
   double settled_sigmas = 0.01;      ///< a reweighting that moves the unknowns by less is the last
   double other_blur = 0.05;          ///< a change of the mean blur from one frame to the next, a fraction of it
   double well_seen_fraction = 0.7;   ///< of the boundary points, to blame the print or the registration
-  double contradicted_sigmas = 5;    ///< by so many the shaft misses an RCM that is elsewhere
   double least_rcm_sigma_m = 1e-7;   ///< of an exact registration: a hundredth of what images tell
 };
 inline constexpr FineFitLimits fine_fit_limits;

@@ -83,7 +83,7 @@ double robust_certainty(const Measurement& m, const ResidualLines& lines, const 
 void add_pulls_of_all(std::span<const Measurement> measurements, const ResidualLines& lines, const CommonErrors& errors,
                       PrintSums& sums) {
   const std::array<double, 3> patterns_px{errors.whole_px, errors.leaning_px, errors.bowed_px};
-  std::array<SharedPull, 3> pulls;
+  std::array<GroupPull, 3> pulls;
   std::array<double, 3> squares{};
   double all = 0;
   for (const Measurement& m : measurements) {
@@ -104,19 +104,19 @@ void add_pulls_of_all(std::span<const Measurement> measurements, const ResidualL
   for (std::size_t i = 0; i < pulls.size(); ++i) {
     if (!(squares[i] > 0 && patterns_px[i] > 0)) continue;
     pulls[i].error_px = patterns_px[i] * std::sqrt(all / squares[i]);
-    sums.shared.push_back(pulls[i]);
+    sums.of_all_boundaries.push_back(pulls[i]);
   }
 }
 
 // One sigma of each number of the rig's camera.
 void add_pulls_of_camera(std::span<const Measurement> measurements, const ResidualLines& lines,
                          const CommonErrors& errors, PrintSums& sums) {
-  std::array<SharedPull, RigErrors::most> pulls;
+  std::array<CameraPull, RigErrors::most> pulls;
   for (const Measurement& m : measurements) {
     const RigErrors::Shifts shifts = robust_certainty(m, lines, errors) * errors.rig.of(m);
     const Eigen::Vector2d by_print = m.group < errors_of_boundary.size() ? print_row(m) : Eigen::Vector2d::Zero();
     for (int i = 0; i < RigErrors::most; ++i) {
-      SharedPull& pull = pulls[static_cast<std::size_t>(i)];
+      CameraPull& pull = pulls[static_cast<std::size_t>(i)];
       pull.x += shifts[i] * m.row;
       pull.by_group[m.group] += shifts[i];
       if (m.group >= errors_of_boundary.size()) continue;
@@ -125,9 +125,9 @@ void add_pulls_of_camera(std::span<const Measurement> measurements, const Residu
         pull.n[edges[edge]] += shifts[i] * by_print[static_cast<Eigen::Index>(edge)];
     }
   }
-  for (SharedPull& pull : pulls) {
+  for (CameraPull& pull : pulls) {
     pull.error_px = 1;
-    sums.shared.push_back(pull);
+    sums.camera.push_back(pull);
   }
 }
 
@@ -161,8 +161,8 @@ double certainty_of(const GroupPull& group) {
   return 1 / (group.weight + 1 / (group.error_px * group.error_px));
 }
 
-// How one sigma of an error that groups share pulls the print's errors, whatever pose, film and groups' errors are.
-PrintVector print_pull_of(const SharedPull& pull, const PrintSums& sums, const PrintCrossMatrix& through) {
+// How one sigma of a number of the camera pulls the print's errors, whatever pose, film and groups' errors are.
+PrintVector print_pull_of(const CameraPull& pull, const PrintSums& sums, const PrintCrossMatrix& through) {
   UnknownVector x = pull.x;
   PrintVector n = pull.n;
   for (std::size_t group = 0; group < measurement_groups; ++group) {
@@ -196,7 +196,7 @@ std::optional<PrintInformation> information_of(const PrintSums& sums) {
   if (!inverse) return std::nullopt;
   const PrintCrossMatrix through = e.nx.lazyProduct(*inverse);
   PrintInformation print{e.nn - through.lazyProduct(e.nx.transpose()), e.n - through.lazyProduct(e.x)};
-  for (const SharedPull& pull : sums.shared)
+  for (const CameraPull& pull : sums.camera)
     if (const PrintVector moved = print_pull_of(pull, sums, through); moved.squaredNorm() > 0)
       print = beside(print, moved);
   return print;
@@ -219,7 +219,8 @@ std::optional<PrintSolution> solved_with_print(const PrintSums& sums, const Prin
     solution.covariance.noalias() += error * error.transpose();
   };
   for (const GroupPull& pull : sums.pulls) widen(pull);
-  for (const GroupPull& pull : sums.shared) widen(pull);
+  for (const GroupPull& pull : sums.of_all_boundaries) widen(pull);
+  for (const CameraPull& pull : sums.camera) widen(pull);
   const bool finite = solution.covariance.allFinite() && solution.step.allFinite() && solution.print_mm.allFinite();
   return finite && (solution.covariance.diagonal().array() > 0).all() ? std::optional(solution) : std::nullopt;
 }

@@ -50,16 +50,17 @@ struct GroupPull {
   double weight = 0, residual = 0, error_px = 0;
 };
 
-/// An error that measurements of several groups share.
-struct SharedPull : GroupPull {
-  std::array<double, measurement_groups> by_group{};  ///< sums of weights times what one sigma of it moves; or zeros
+/// What one sigma of a number of the rig's camera does to the measurements of all groups.
+struct CameraPull : GroupPull {
+  std::array<double, measurement_groups> by_group{};  ///< sums of weights times what it moves
 };
 
-/// Of all measurements; what each group says, and what errors do that measurements of several groups share.
+/// Of all measurements; what each group says, and what errors do that all boundaries or all groups share.
 struct PrintSums {
   PrintEquations equations;
   std::array<GroupPull, measurement_groups> pulls;
-  InplaceVector<SharedPull, 3 + RigErrors::most> shared;
+  InplaceVector<GroupPull, 3> of_all_boundaries;
+  InplaceVector<CameraPull, RigErrors::most> camera;
 };
 
 /// Weighted robustly about `lines`. `film_prior` as the fit has it.

@@ -139,6 +139,17 @@ double missed_sigmas(const UnknownVector& step, const UnknownMatrix& covariance,
   return std::sqrt(std::max(0.0, missed.dot(of_both.inverse() * missed)));
 }
 
+// The same of what the image alone shows; 0 where that is no whole pose. Most frames show the rig's print, and of that
+// pass the RCM.
+double missed_by_image(const PrintSums& by_image, const RcmMeasurement& rcm, const Hypotheses& prior,
+                       const PrintDoubt& doubt, const Marker& marker) {
+  const auto free = solved_with_print(by_image, prior[0].prior);
+  const double sigmas = free ? missed_sigmas(free->step, free->covariance, rcm) : 0;
+  if (!(sigmas > limits.clearly_missed_sigmas)) return sigmas;
+  const auto whole = judged(by_image, prior, doubt, marker);
+  return whole ? missed_sigmas(whole->mixture.step(), whole->mixture.covariance(), rcm) : 0;
+}
+
 }  // namespace
 
 double p_false_of(double mean_rad, double variance_rad2) {
@@ -147,35 +158,37 @@ double p_false_of(double mean_rad, double variance_rad2) {
 }
 
 std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const ResidualLines& lines,
-                                  const std::optional<RcmMeasurement>& rcm, bool through_rcm, double film_prior,
-                                  const Marker& marker, bool is_known, const CommonErrors& errors) {
+                                  const std::optional<RcmBesideFit>& rcm, double film_prior, const Marker& marker,
+                                  bool is_known, const CommonErrors& errors) {
   const PrintSums by_image = print_sums(measurements, lines, film_prior, errors);
-  const PrintSums sums = rcm && through_rcm ? held(by_image, *rcm) : by_image;
   const Hypotheses prior = prior_hypotheses(marker, is_known);
+  PrintFit fit;
+  if (rcm) {
+    fit.rcm_missed_sigmas = missed_by_image(by_image, rcm->measurement, prior, errors.doubt, marker);
+    fit.through_rcm = !(rcm->may_be_contradicted && fit.rcm_missed_sigmas > limits.contradicted_sigmas);
+  }
+  const PrintSums sums = fit.through_rcm ? held(by_image, rcm->measurement) : by_image;
   const auto print = judged(sums, prior, errors.doubt, marker);
   if (!print) return std::nullopt;
   const auto exact = prior[0].prior.bands_mm > 0 ? solved_with_print(sums, {}) : print->as_the_rig_says;
-  if (!exact) return std::nullopt;
-  PrintFit fit;
-  fit.step = print->mixture.step() - exact->step;  // whose pose is where the measurements were taken
-  fit.step_as_the_rig_says = print->as_the_rig_says.step - exact->step;
+  // Where the passes ended, and the measurements were taken.
+  const bool as_passes = !rcm || rcm->held_by_passes == fit.through_rcm;
+  const auto settled =
+      as_passes ? exact : solved_with_print(fit.through_rcm ? by_image : held(by_image, rcm->measurement), {});
+  if (!exact || !settled) return std::nullopt;
+  fit.step = print->mixture.step() - settled->step;
+  fit.step_as_the_rig_says = print->as_the_rig_says.step - settled->step;
   for (Measurement& m : measurements)
     m.residual_px -= m.row.dot(fit.step) + print_shift_px(m, print->mixture.print_mm());
   fit.covariance = print->mixture.covariance().topLeftCorner<pose_unknowns, pose_unknowns>();
+  if (fit.through_rcm)
+    fit.by_rcm_m = (print->as_the_rig_says.inverse * rcm->measurement.rows.transpose() * rcm->measurement.by_rcm_m)
+                       .topRows<pose_unknowns>();
   const auto psi_variance = [](const PrintSolution& s) { return s.covariance(psi_unknown, psi_unknown); };
   fit.off_probability = off_probability(print->all);
   fit.p_false = print->mixture.p_false();
   fit.p_false_by_tolerance = p_false_of(0, psi_variance(print->as_the_rig_says)) - p_false_of(0, psi_variance(*exact));
   fit.psi_variance_by_tolerance = psi_variance(print->as_the_rig_says) - psi_variance(*exact);
-  if (!rcm) return fit;
-  if (through_rcm)
-    fit.by_rcm_m = (print->as_the_rig_says.inverse * rcm->rows.transpose() * rcm->by_rcm_m).topRows<pose_unknowns>();
-  // Most frames show the rig's print, and of that pass the RCM.
-  const auto free = solved_with_print(by_image, prior[0].prior);
-  if (free) fit.rcm_missed_sigmas = missed_sigmas(free->step, free->covariance, *rcm);
-  if (!(fit.rcm_missed_sigmas > limits.clearly_missed_sigmas)) return fit;
-  if (const auto whole = through_rcm ? judged(by_image, prior, errors.doubt, marker) : print)
-    fit.rcm_missed_sigmas = missed_sigmas(whole->mixture.step(), whole->mixture.covariance(), *rcm);
   return fit;
 }
 

@@ -26,9 +26,10 @@ struct PrintLimits {
   std::array<ErrorSize, 5> inks{{{0.04, 0.02}, {0.08, 0.01}, {0.16, 0.005}, {0.32, 0.0025}, {0.64, 0.00125}}};
   /// Each size from off_mm on of prints that were seen to be the rig's, and each beyond a measured print's sigma.
   double fraction_of_known = 1e-4;
-  double off_mm = 0.04;              ///< a print is off by this and more
-  double min_weight = 1e-6;          ///< of a size that counts
-  double clearly_missed_sigmas = 3;  ///< of the RCM, from which on prints that are off are asked, too
+  double off_mm = 0.04;      ///< a print is off by this and more
+  double min_weight = 1e-6;  ///< of a size that counts
+  /// Of the RCM: from the one on prints that are off are asked, too; from the other on it lies elsewhere.
+  double clearly_missed_sigmas = 3, contradicted_sigmas = 5;
 };
 inline constexpr PrintLimits print_limits;
 
@@ -45,20 +46,27 @@ struct PrintFit {
   Eigen::Matrix<double, pose_unknowns, 3> by_rcm_m = Eigen::Matrix<double, pose_unknowns, 3>::Zero();
   /// By how many sigmas the shaft that the image alone shows misses the RCM, whatever the print is.
   double rcm_missed_sigmas = 0;
+  bool through_rcm = false;              ///< held there: the shaft does not miss it by contradicted_sigmas
   double off_probability = 0;            ///< that the print is off by print_limits.off_mm and more
   double p_false = 1;                    ///< that psi is wrong
   double p_false_by_tolerance = 0;       ///< what the rig's tolerance adds to it
   double psi_variance_by_tolerance = 0;  ///< what the rig's tolerance adds to an exact print's
 };
 
+/// The RCM beside a fit: how far the shaft passes it, whether the passes held it there, and whether the frame shows
+/// enough to contradict it.
+struct RcmBesideFit {
+  RcmMeasurement measurement;
+  bool held_by_passes = false, may_be_contradicted = false;
+};
+
 /// Tells the print's errors from the settled measurements' residuals. How large they usually are is not known, so the
 /// pose is a mean over the rig's print and prints that are off (PrintLimits), each weighted by how likely it makes the
 /// residuals. On return the residuals are those that the step and the print's likeliest errors leave.
 /// `lines` are those of these residuals, `film_prior` as the fit has it, `is_known`: earlier frames showed that the
-/// print is the rig's. `rcm` may be absent; `through_rcm`: the shaft is held at it. Nullopt when a direction is not
-/// seen at all.
+/// print is the rig's. Nullopt when a direction is not seen at all.
 std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const ResidualLines& lines,
-                                  const std::optional<RcmMeasurement>& rcm, bool through_rcm, double film_prior,
-                                  const Marker& marker, bool is_known, const CommonErrors& errors);
+                                  const std::optional<RcmBesideFit>& rcm, double film_prior, const Marker& marker,
+                                  bool is_known, const CommonErrors& errors);
 
 }  // namespace lapservo::internal

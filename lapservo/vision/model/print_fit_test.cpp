@@ -47,8 +47,8 @@ PrintFit fit_of(const Shot& shot, const Marker& believed, std::optional<std::siz
   }
   const ResidualLines lines = residual_lines(edges.all);
   const CommonErrors errors = common_errors(edges, lines, lens, std::nullopt, {}, {});
-  return fit_print(edges.all, lines, sight.scene().registration->of(truth.pose(), 1e-7), true, 0, believed, is_known,
-                   errors)
+  return fit_print(edges.all, lines, RcmBesideFit{sight.scene().registration->of(truth.pose(), 1e-7), true, true}, 0,
+                   believed, is_known, errors)
       .value();
 }
 
