@@ -12,6 +12,9 @@
 
 #include <gtest/gtest.h>
 
+#include "acceptance/laboratory.h"
+#include "lapservo/calibration/registration/registration.h"
+#include "lapservo/calibration/registration/registration_measurement.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/core/random.h"
 #include "lapservo/geometry/rotation.h"
@@ -209,6 +212,49 @@ TEST(RigSigmas, OfACameraAreInThePose) {
     EXPECT_GE(told, 0.8 * frames) << name;
     spread.expect(0.6, 1.4);
   }
+}
+
+// A laboratory that registers its arm by a swing, and tracks ten frames more by what that wrote. Nothing where the
+// registration is refused.
+void track_by_registration(std::uint64_t seed, Row& row, Spread& pose) {
+  constexpr int frames = 10;
+  const laboratories::Recording recording{seed, seed % 2 != 0 ? 1.0 : 4.0, seed % 3 == 2};
+  const laboratories::Swing swung = laboratories::swing(recording);
+  const Instrument& truth = swung.truth.instruments[0];
+  Instrument named = truth;
+  named.camera_from_rcm.reset(), named.image_delay_s.reset();
+  named.joints->sign = {1, 1, 1, 1}, named.joints->offset = {};
+  const Registration found = register_arm(named, swung.poses, swung.joints, "joints");
+  ASSERT_EQ(found.refusal, "") << "seed " << seed;
+  Rig rig = swung.truth;
+  rig.instruments[0] = registered(named, found);
+  Renderer renderer(rig.camera, shafts_of(rig), make_tissue(rig.camera.width_px, rig.camera.height_px, seed),
+                    laboratories::with_noise(recording.noise));
+  for (int i = 0; i < frames; ++i) {
+    const JointVector q = laboratories::swinging(swung.truth, 20 + 0.7 * i, seed);
+    const auto noise = 1000 * seed + 500 + static_cast<std::uint64_t>(i);
+    const Observation seen = Tracker(rig).track(renderer.render({placement_of(truth, q)}, noise))[0];
+    ++row.frames;
+    if (seen.status != Status::ok || !seen.rcm) continue;
+    ++row.told;
+    add_q(*seen.rcm, q, row.q);
+    const ShaftPose at = pose_through_rcm(*truth.camera_from_rcm, q);
+    add_pose(*seen.marker, camera_from_marker(truth.marker, at.camera_from_unrolled, at.psi_rad), pose);
+  }
+}
+
+// LAPSERVO_SIGMA_LABORATORIES of them (2).
+TEST(RigSigmas, OfALaboratorysOwnRegistrationAreInQ) {
+  Row row;
+  Spread pose = spread_of_pose();
+  const int laboratories = from_environment("LAPSERVO_SIGMA_LABORATORIES", 2);
+  for (int i = 0; i < laboratories; ++i)
+    track_by_registration(static_cast<std::uint64_t>(from_environment("LAPSERVO_SIGMA_SEED", 1) + i), row, pose);
+  const std::string name = std::to_string(laboratories) + " laboratories";
+  row.print(name + ", q"), pose.print(name + ", marker", row.told, row.frames);
+  EXPECT_GE(row.told, 0.95 * row.frames);
+  EXPECT_LT(row.q.worst(), 4.5);
+  EXPECT_LT(pose.worst(), 4.5);
 }
 
 }  // namespace

@@ -48,7 +48,7 @@ inline auto members(Joints& v) {
 }
 inline auto members(Instrument& v) {
   return std::tie(v.name, v.marker, v.camera_from_rcm, v.joints, v.image_delay_s, v.sigma_translation_m,
-                  v.sigma_quaternion_xyzw, v.sigma_image_delay_s);
+                  v.sigma_quaternion_xyzw, v.registration_covariance, v.sigma_image_delay_s);
 }
 inline auto members(Rig& v) {
   return std::tie(v.camera, v.instruments, v.camera_file);
