@@ -28,9 +28,9 @@ class OtherRobot:
 
 
 def film(robot, rig, ended):
-    """Publishes what a camera would see of the robot, some ten images a second."""
+    """Publishes what a camera would see of the robot, some twenty images a second."""
     images, renderer, mounted = lapservo.Ros2ImagePublisher("/endoscope/image_raw"), lapservo.Renderer(rig), rig.instruments[0].joints
-    while not ended.wait(0.08):
+    while not ended.wait(0.03):
         exposed_s = time.time()
         q = mounted.offset + mounted.sign * robot.joints / OWN_UNITS
         images.publish(renderer.render(q, seed=int(1000 * exposed_s)), exposed_s)

@@ -1,7 +1,10 @@
 #include "lapservo/calibration/check/work_space.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
+#include <limits>
 
 #include "lapservo/core/angles.h"
 #include "lapservo/core/statistics.h"
@@ -82,15 +85,15 @@ std::optional<Rigid3> shaft_in_view(const Judge& judge, const Eigen::Vector3d& m
   return shaft;
 }
 
-// Rms over rotations; nullopt where it is not found at most of them.
+// The median over rotations, of which those that are not found count as the worst; nullopt where most are not.
 std::optional<double> sigma_at(Judge& judge, const Rigid3& shaft) {
-  constexpr int turns = 3;
-  double squares = 0;
-  int found = 0;
-  for (int i = 0; i < turns; ++i)
-    if (const auto sigma_rad = judge.sigma_rad(shaft, two_pi * i / turns)) squares += *sigma_rad * *sigma_rad, ++found;
-  if (2 * found < turns) return std::nullopt;
-  return std::sqrt(squares / found);
+  constexpr std::size_t turns = 3;
+  constexpr double not_found = std::numeric_limits<double>::infinity();
+  std::array<double, turns> sigmas_rad;
+  for (std::size_t i = 0; i < turns; ++i)
+    sigmas_rad[i] = judge.sigma_rad(shaft, two_pi * static_cast<double>(i) / turns).value_or(not_found);
+  std::sort(sigmas_rad.begin(), sigmas_rad.end());
+  return sigmas_rad[turns / 2] < not_found ? std::optional(sigmas_rad[turns / 2]) : std::nullopt;
 }
 
 // Near and far of where the marker was, where it was measured.

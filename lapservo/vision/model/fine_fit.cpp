@@ -279,7 +279,6 @@ void Fitter::count_inliers() {
 }
 
 void Fitter::tell(const PrintFit& print) {
-  fit_.rcm_missed_sigmas = print.rcm_missed_sigmas;
   if (scene_.registration) fit_.with_registration = print.by_rcm_m * scene_.registration->covariance.topRows<3>();
   fit_.covariance = print.covariance;
   fit_.off_probability = print.off_probability;

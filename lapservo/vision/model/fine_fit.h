@@ -37,7 +37,6 @@ struct FineFit {
   PoseMatrix covariance = PoseMatrix::Zero();  ///< of the unknowns, one sigma squared
   /// Covariance of the unknowns with the registration's numbers (RcmPrior).
   Eigen::Matrix<double, pose_unknowns, 6> with_registration = Eigen::Matrix<double, pose_unknowns, 6>::Zero();
-  double rcm_missed_sigmas = 0;  ///< as PrintFit has it
   EdgeBlur blur;
   int lines = 0;                  ///< generatrices looked at
   std::array<int, 4> used{};      ///< of them, lines on which the boundary was located and agrees with the fit

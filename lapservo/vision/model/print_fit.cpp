@@ -163,10 +163,11 @@ std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const Res
   const PrintSums by_image = print_sums(measurements, lines, film_prior, errors);
   const Hypotheses prior = prior_hypotheses(marker, is_known);
   PrintFit fit;
-  if (rcm) {
-    fit.rcm_missed_sigmas = missed_by_image(by_image, rcm->measurement, prior, errors.doubt, marker);
-    fit.through_rcm = !(rcm->may_be_contradicted && fit.rcm_missed_sigmas > limits.contradicted_sigmas);
-  }
+  const auto is_contradicted = [&] {
+    return rcm->may_be_contradicted &&
+           missed_by_image(by_image, rcm->measurement, prior, errors.doubt, marker) > limits.contradicted_sigmas;
+  };
+  fit.through_rcm = rcm && !is_contradicted();
   const PrintSums sums = fit.through_rcm ? held(by_image, rcm->measurement) : by_image;
   const auto print = judged(sums, prior, errors.doubt, marker);
   if (!print) return std::nullopt;

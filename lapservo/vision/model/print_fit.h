@@ -44,9 +44,8 @@ struct PrintFit {
   PoseMatrix covariance;               ///< of the pose's unknowns
   /// d(the pose's unknowns)/d(RCM in the camera frame) [1/m].
   Eigen::Matrix<double, pose_unknowns, 3> by_rcm_m = Eigen::Matrix<double, pose_unknowns, 3>::Zero();
-  /// By how many sigmas the shaft that the image alone shows misses the RCM, whatever the print is.
-  double rcm_missed_sigmas = 0;
-  bool through_rcm = false;              ///< held there: the shaft does not miss it by contradicted_sigmas
+  /// Held at the RCM: what the image alone shows, whatever the print is, does not miss it by contradicted_sigmas.
+  bool through_rcm = false;
   double off_probability = 0;            ///< that the print is off by print_limits.off_mm and more
   double p_false = 1;                    ///< that psi is wrong
   double p_false_by_tolerance = 0;       ///< what the rig's tolerance adds to it
