@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <filesystem>
+#include <limits>
 #include <optional>
 #include <string>
 #include <utility>
@@ -12,6 +13,7 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/marker/decoder.h"
+#include "lapservo/rig/check_rig.h"
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/sample_frames.h"
 #include "lapservo/testing/temporary_folder.h"
@@ -470,6 +472,24 @@ TEST(Rig, HoldsTheRegistrationsCovariance) {
   ASSERT_TRUE(rig.instruments[0].registration_covariance);
   EXPECT_EQ((*rig.instruments[0].registration_covariance)(0, 1), 5e-7);
   EXPECT_THROW(parse_rig(text("4e-7"), "rig.yaml"), InputError) << "not symmetric";
+}
+
+// Put together in a program.
+TEST(Rig, WithWhichNothingCanBeSeenIsRefused) {
+  const Rig right = parse_rig(good, "rig.yaml");
+  check_rig(right);
+  const auto expect_refused = [&](const auto& change) {
+    Rig rig = right;
+    change(rig);
+    EXPECT_THROW(check_rig(rig), InputError);
+  };
+  constexpr double none = std::numeric_limits<double>::quiet_NaN();
+  expect_refused([](Rig& rig) { rig = {}; });
+  expect_refused([](Rig& rig) { rig.camera.fx_px = none; });
+  expect_refused([](Rig& rig) { rig.camera.distortion[4] = none; });
+  expect_refused([](Rig& rig) { rig.instruments.clear(); });
+  expect_refused([](Rig& rig) { rig.instruments[0].marker.diameter_m = -1; });
+  expect_refused([](Rig& rig) { rig.instruments[0].camera_from_rcm->translation.x() = none; });
 }
 
 }  // namespace

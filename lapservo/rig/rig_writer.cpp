@@ -192,8 +192,4 @@ std::string rig_yaml(const Rig& rig, const fs::path& destination) {
   return lines.text();
 }
 
-void check_rig(const Rig& rig) {
-  parse_rig(rig_yaml(rig), "rig");
-}
-
 }  // namespace lapservo::internal

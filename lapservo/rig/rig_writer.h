@@ -11,9 +11,6 @@ namespace lapservo::internal {
 /// named so that it is found from there; else the camera stands in the rig itself.
 std::string rig_yaml(const Rig& rig, const std::filesystem::path& destination = {});
 
-/// Throws InputError, as load_rig() does, for a rig that was put together in a program and that no file may hold.
-void check_rig(const Rig& rig);
-
 /// The lines of a camera file, or of a rig's `camera`, each after so many spaces.
 std::string camera_yaml(const Camera& camera, int indent = 0);
 

@@ -5,7 +5,7 @@
 
 #include "lapservo/core/error.h"
 #include "lapservo/core/words.h"
-#include "lapservo/rig/rig_writer.h"
+#include "lapservo/rig/check_rig.h"
 #include "lapservo/vision/image/image_view.h"
 #include "lapservo/vision/image/interlacing.h"
 #include "lapservo/vision/paper/centerline.h"

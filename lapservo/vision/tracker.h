@@ -42,7 +42,7 @@ struct TrackerOptions {
 /// of sight for 2 s, in which the instrument may have been exchanged.
 class Tracker {
  public:
-  /// Throws InputError for a rig that load_rig() would refuse, and for options out of their ranges.
+  /// Throws InputError for a rig that nothing can be seen with, and for options out of their ranges.
   explicit Tracker(const Rig& rig, TrackerOptions options = {});
   ~Tracker();
   Tracker(Tracker&&) noexcept;

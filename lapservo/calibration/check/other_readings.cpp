@@ -60,6 +60,8 @@ class OtherReadings {
     Rig rig = rig_;
     for (Instrument& instrument : rig.instruments) instrument.camera_from_rcm.reset();
     change(rig);
+    for (const Instrument& instrument : rig.instruments)
+      if (marker_problem(instrument.marker)) return false;
     return most(frames_, [&](const cv::Mat& frame) {
       return any_ok(Tracker(rig, {.deinterlace = deinterlaced_}).track(frame));
     });
