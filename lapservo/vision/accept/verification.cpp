@@ -100,6 +100,7 @@ Status validate(const Scene& scene, const FineFit& fit) {
   const bool is_cut = agreement.in_image < limits.wholly_in_image && scene.others.empty();
   if (!shows_enough(scene, agreement, fit)) return is_cut ? Status::cut : Status::occluded;
   if (agreement.wrong > limits.max_wrong || !agrees_well(fit)) return Status::poor_fit;
+  if (scene.registration && !fit.unknowns.through_rcm() && !fit.is_well_seen()) return Status::uncertain;
   return validate_psi(scene, fit);
 }
 

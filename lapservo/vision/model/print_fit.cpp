@@ -164,6 +164,7 @@ std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const Res
   const Hypotheses prior = prior_hypotheses(marker, is_known);
   PrintFit fit;
   const auto is_contradicted = [&] {
+    if (!rcm->measurement.is_proximal) return true;
     return rcm->may_be_contradicted &&
            missed_by_image(by_image, rcm->measurement, prior, errors.doubt, marker) > limits.contradicted_sigmas;
   };

@@ -40,6 +40,7 @@ RcmMeasurement RcmPrior::of(const ShaftPose& pose, double least_sigma_m) const {
   measurement.rows = root.matrixL().solve(rows);
   measurement.residual = root.matrixL().solve(Eigen::Vector2d(-rcm.head<2>()));
   measurement.by_rcm_m = root.matrixL().solve(Eigen::Matrix<double, 2, 3>(-across));
+  measurement.is_proximal = rcm.z() < 0;
   return measurement;
 }
 

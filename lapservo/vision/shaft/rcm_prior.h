@@ -18,6 +18,7 @@ struct RcmMeasurement {
   Eigen::Vector2d residual = Eigen::Vector2d::Zero();
   /// d(residual)/d(RCM in the camera frame) [1/m].
   Eigen::Matrix<double, 2, 3> by_rcm_m = Eigen::Matrix<double, 2, 3>::Zero();
+  bool is_proximal = true;  ///< the RCM lies on the marker's proximal side, as that of every shaft does
 };
 
 /// What a rig knows of where an instrument's RCM frame is.

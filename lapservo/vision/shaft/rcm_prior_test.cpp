@@ -79,6 +79,15 @@ TEST(RcmPrior, MissesAreInUnitsOfTheirSigma) {
   EXPECT_LT((squares - Eigen::Matrix2d::Identity()).norm(), 0.1);
 }
 
+TEST(RcmPrior, LiesOnTheProximalSideOfEveryShaft) {
+  Random random(7);
+  const Scene scene(random);
+  EXPECT_TRUE(scene.registration.of(scene.unknowns.pose(), 1e-4).is_proximal);
+  ShaftPose reversed = scene.unknowns.pose();
+  reversed.camera_from_unrolled.rotation = reversed.camera_from_unrolled.rotation * rotation_by({pi, 0, 0});
+  EXPECT_FALSE(scene.registration.of(reversed, 1e-4).is_proximal);
+}
+
 TEST(RcmPrior, IsKnownToARadiusOrNot) {
   RcmPrior registration;
   EXPECT_TRUE(registration.is_within(1e-6)) << "exact";
