@@ -174,16 +174,16 @@ PrintVector print_pull_of(const CameraPull& pull, const PrintSums& sums, const P
   return n - through * x;
 }
 
-// What is left of the information where an error that pulls so may be in it, as doubted() has it.
-PrintInformation beside(PrintInformation print, const PrintVector& moved) {
+// Errors of the print that look like one sigma of each number of the camera.
+InplaceVector<PrintVector, RigErrors::most> shapes_of_camera(const PrintInformation& print, const PrintSums& sums,
+                                                             const PrintCrossMatrix& through) {
   constexpr double ridge = 1e-9;
   PrintMatrix solvable = print.information;
   solvable.diagonal().array() += ridge * print.information.trace();
-  const PrintVector shape = solvable.ldlt().solve(moved);
-  const double certainty = 1 / (1 + shape.dot(moved));
-  print.gradient -= certainty * shape.dot(print.gradient) * moved;
-  print.information -= certainty * moved * moved.transpose();
-  return print;
+  const Eigen::LDLT<PrintMatrix> factor(solvable);
+  InplaceVector<PrintVector, RigErrors::most> shapes;
+  for (const CameraPull& pull : sums.camera) shapes.push_back(factor.solve(print_pull_of(pull, sums, through)));
+  return shapes;
 }
 
 }  // namespace
@@ -195,11 +195,8 @@ std::optional<PrintInformation> information_of(const PrintSums& sums) {
   const auto inverse = inverse_of(e.xx);
   if (!inverse) return std::nullopt;
   const PrintCrossMatrix through = e.nx.lazyProduct(*inverse);
-  PrintInformation print{e.nn - through.lazyProduct(e.nx.transpose()), e.n - through.lazyProduct(e.x)};
-  for (const CameraPull& pull : sums.camera)
-    if (const PrintVector moved = print_pull_of(pull, sums, through); moved.squaredNorm() > 0)
-      print = beside(print, moved);
-  return print;
+  const PrintInformation print{e.nn - through.lazyProduct(e.nx.transpose()), e.n - through.lazyProduct(e.x)};
+  return sums.camera.empty() ? print : doubted(print, shapes_of_camera(print, sums, through));
 }
 
 std::optional<PrintSolution> solved_with_print(const PrintSums& sums, const PrintPrior& prior) {

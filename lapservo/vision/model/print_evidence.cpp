@@ -29,7 +29,7 @@ PrintMatrix inverse_by_boundary(const PrintMatrix& information) {
 
 }  // namespace
 
-PrintInformation doubted(PrintInformation print, const PrintShapes& shapes_mm) {
+PrintInformation doubted(PrintInformation print, std::span<const PrintVector> shapes_mm) {
   for (const PrintVector& shape : shapes_mm) {
     const PrintVector seen = print.information.lazyProduct(shape);
     const double certainty = 1 / (1 + shape.dot(seen));

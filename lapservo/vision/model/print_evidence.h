@@ -1,5 +1,7 @@
 #pragma once
 
+#include <span>
+
 #include "lapservo/vision/model/print_doubt.h"
 
 namespace lapservo::internal {
@@ -13,7 +15,7 @@ struct PrintInformation {
 
 /// What they say when such shapes of unknown size (one sigma each) may be in them: the covariance that the information
 /// stands for grows by them (the Woodbury identity, a shape at a time).
-PrintInformation doubted(PrintInformation print, const PrintShapes& shapes_mm);
+PrintInformation doubted(PrintInformation print, std::span<const PrintVector> shapes_mm);
 
 /// How large the print's errors are (one sigma) [mm]: each by itself, and both inner boundaries' alike, since the
 /// middle ink lies aside, which looks most like a turn. Their covariance is bands^2 I + ink^2 c c^T, c the inner

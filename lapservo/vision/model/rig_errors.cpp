@@ -3,17 +3,21 @@
 #include <cmath>
 
 namespace lapservo::internal {
+namespace {
+
+// One sigma of the exponent by which light may be off: v^(1 + x) differs from v by x v ln(v), by 0.28 x at most beside
+// what another exposure makes of it.
+double sigma_exponent(const Response& response) {
+  constexpr double value_by_exponent = 0.28;
+  return response.sigma.value_or(0) / value_by_exponent;
+}
+
+}  // namespace
 
 bool has_sigmas(const Camera& camera) {
   CameraSigmas geometry = camera.sigmas;
   geometry.blue = geometry.red = 0;
   return geometry != CameraSigmas{} || camera.response.sigma;
-}
-
-// v^(1 + x) differs from v by x v ln(v): by 0.28 x at most beside what another exposure makes of it.
-double sigma_exponent(const Response& response) {
-  constexpr double value_by_exponent = 0.28;
-  return response.sigma.value_or(0) / value_by_exponent;
 }
 
 RigErrors::RigErrors(const Camera& camera, const std::array<double, 4>& by_exponent_px) : camera_(&camera) {

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <array>
-#include <span>
 
 #include "lapservo/geometry/camera.h"
 #include "lapservo/vision/edges/edge_measurements.h"
@@ -31,8 +30,5 @@ class RigErrors {
 
 /// Whether the camera has sigmas that move measurements.
 bool has_sigmas(const Camera& camera);
-
-/// One sigma of the exponent by which light may be off, by the sigma of the response's values.
-double sigma_exponent(const Response& response);
 
 }  // namespace lapservo::internal
