@@ -91,7 +91,10 @@ std::optional<DelayEstimate> DelayEstimator::estimate() const {
   // A sum of squares grows by 1 at one sigma. A residual that the measured joints do not explain counts as noise that
   // persists over several frames.
   const double misfit = std::max(1.0, lowest->squares / (4 * weight_));
-  const double sigma_s = std::sqrt(2 / curvature * misfit * frames_alike + variance_by_model(middle, shift_s));
+  const double by_noise_s2 = 2 / curvature * misfit * frames_alike;
+  // What a wrong model does takes longer to tell, and only adds.
+  if (!(by_noise_s2 <= config_.max_sigma_s * config_.max_sigma_s)) return std::nullopt;
+  const double sigma_s = std::sqrt(by_noise_s2 + variance_by_model(middle, shift_s));
   if (!(sigma_s <= config_.max_sigma_s)) return std::nullopt;
   return DelayEstimate{delay_s, sigma_s};
 }
