@@ -47,10 +47,11 @@ class OtherReadings {
  private:
   template <typename Change>
   bool found_in_images(Change change) const {
+    Tracker tracker(rig_, {.single = true, .deinterlace = deinterlaced_});
     return most(frames_, [&](const cv::Mat& frame) {
       cv::Mat changed;
       change(frame, changed);
-      return any_ok(Tracker(rig_, {.deinterlace = deinterlaced_}).track(changed));
+      return any_ok(tracker.track(changed));
     });
   }
 
@@ -62,9 +63,8 @@ class OtherReadings {
     change(rig);
     for (const Instrument& instrument : rig.instruments)
       if (marker_problem(instrument.marker)) return false;
-    return most(frames_, [&](const cv::Mat& frame) {
-      return any_ok(Tracker(rig, {.deinterlace = deinterlaced_}).track(frame));
-    });
+    Tracker tracker(rig, {.single = true, .deinterlace = deinterlaced_});
+    return most(frames_, [&](const cv::Mat& frame) { return any_ok(tracker.track(frame)); });
   }
 
   std::string other_images() const {
@@ -135,10 +135,11 @@ std::string found_otherwise(const std::vector<cv::Mat>& frames, const Rig& rig, 
 }
 
 bool shows_q_when_turned(const std::vector<cv::Mat>& frames, const Rig& rig, bool deinterlaced) {
+  Tracker tracker(rig, {.single = true, .deinterlace = deinterlaced});
   return most(frames, [&](const cv::Mat& frame) {
     cv::Mat turned;
     cv::rotate(frame, turned, cv::ROTATE_180);
-    const auto observations = Tracker(rig, {.deinterlace = deinterlaced}).track(turned);
+    const auto& observations = tracker.track(turned);
     return std::any_of(observations.begin(), observations.end(),
                        [](const Observation& observation) { return observation.rcm.has_value(); });
   });
