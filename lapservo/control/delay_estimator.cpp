@@ -92,7 +92,7 @@ std::optional<DelayEstimate> DelayEstimator::estimate() const {
   // persists over several frames.
   const double misfit = std::max(1.0, lowest->squares / (4 * weight_));
   const double by_noise_s2 = 2 / curvature * misfit * frames_alike;
-  // What a wrong model does takes longer to tell, and only adds.
+  // A wrong model only adds to it, and costs a factorisation to ask.
   if (!(by_noise_s2 <= config_.max_sigma_s * config_.max_sigma_s)) return std::nullopt;
   const double sigma_s = std::sqrt(by_noise_s2 + variance_by_model(middle, shift_s));
   if (!(sigma_s <= config_.max_sigma_s)) return std::nullopt;
