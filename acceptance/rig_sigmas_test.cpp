@@ -121,9 +121,10 @@ Rig with_registration(Rig rig, double sigma_m, double sigma_rad, Random& random)
 TEST(RigSigmas, OfARegistrationAreInQ) {
   for (const auto& [sigma_mm, sigma_mrad] :
        {std::pair(0.3, 1.0), std::pair(1.0, 5.0), std::pair(3.0, 20.0), std::pair(10.0, 50.0)}) {
-    const Row row = tracked(testing::paper_test_rig(), [&](const Rig& rig, Random& random) {
-      return with_registration(rig, 1e-3 * sigma_mm, 1e-3 * sigma_mrad, random);
-    });
+    const Row row = tracked(testing::paper_test_rig(),
+                            [sigma_m = 1e-3 * sigma_mm, sigma_rad = 1e-3 * sigma_mrad](const Rig& rig, Random& random) {
+                              return with_registration(rig, sigma_m, sigma_rad, random);
+                            });
     char name[64];
     std::snprintf(name, sizeof name, "registration to %.1f mm, %.0f mrad", sigma_mm, sigma_mrad);
     row.print(name);
