@@ -4,18 +4,11 @@
 #include <string_view>
 
 #include <Eigen/Core>
-#include <Eigen/Geometry>
 
 #include "lapservo/control/feature_model.h"
+#include "lapservo/geometry/rigid3.h"
 
 namespace lapservo {
-
-/// The marker as one frame shows it, whether or not it is known where the RCM is.
-struct SeenMarker {
-  Eigen::Vector4d inner_px = Eigen::Vector4d::Zero();    ///< e1 u, v, e2 u, v on ideal pixels
-  Eigen::Vector3d position_m = Eigen::Vector3d::Zero();  ///< camera_from_marker
-  Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
-};
 
 /// Whether an image equals the previous one in every pixel.
 enum class Repetition {
@@ -36,8 +29,8 @@ struct ImageMeasurement {
   Eigen::Matrix4d covariance = Eigen::Matrix4d::Identity();  ///< of the features
   Eigen::Vector4d ends_px = Eigen::Vector4d::Zero();         ///< e0 u, v, e3 u, v
   std::optional<Eigen::Vector4d> q;                          ///< a start for the first frame, when known
-  std::optional<SeenMarker> marker{};  ///< also where `found` is false because nobody knows where the RCM is
-  int registration = 0;                ///< which camera_from_rcm it was seen with: ServoDecision::registration
+  std::optional<Rigid3> camera_from_marker{};  ///< also where `found` is false because nobody knows where the RCM is
+  int registration = 0;                        ///< which camera_from_rcm it was seen with: ServoDecision::registration
   Repetition repetition = Repetition::none;
 };
 

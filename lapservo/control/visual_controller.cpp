@@ -26,8 +26,8 @@ bool all_finite(const ImageMeasurement& image) {
   return std::isfinite(image.time_s) &&
          (!image.found || (image.features.allFinite() && image.covariance.allFinite() && image.ends_px.allFinite() &&
                            (!image.q || image.q->allFinite()))) &&
-         (!image.marker || (image.marker->inner_px.allFinite() && image.marker->position_m.allFinite() &&
-                            image.marker->rotation.coeffs().allFinite() && image.ends_px.allFinite()));
+         (!image.camera_from_marker || (image.camera_from_marker->translation.allFinite() &&
+                                        image.camera_from_marker->rotation.coeffs().allFinite()));
 }
 
 }  // namespace
@@ -161,7 +161,7 @@ void VisualController::remember(double time_s, const Eigen::Vector4d& q_joint, s
 HoldReason VisualController::update(const ImageMeasurement& image) {
   if (!all_finite(image)) return HoldReason::non_finite;
   const bool suspended = suspended_ != HoldReason::none;
-  if (!image.found && !(suspended && image.marker)) return HoldReason::marker_lost;
+  if (!image.found && !(suspended && image.camera_from_marker)) return HoldReason::marker_lost;
   if (now_s_ - image.time_s > config_.max_image_age_s) return HoldReason::stale_image;
   // A repeated or older stamp carries no information: the age of the last measurement goes on growing.
   if (image_s_ && image.time_s <= *image_s_) return image_reason_;

@@ -3,19 +3,10 @@
 #include <string>
 #include <vector>
 
-#include <Eigen/Core>
-
-#include "lapservo/geometry/rigid3.h"
 #include "lapservo/rig/rig.h"
+#include "lapservo/servo/sighting_fit.h"
 
 namespace lapservo::internal {
-
-/// The joints as the rig reads them and the marker as one image shows it, without the registration.
-struct JointsAndMarker {
-  double time_s = 0;
-  Eigen::Vector4d q = Eigen::Vector4d::Zero(), rate = Eigen::Vector4d::Zero();  ///< rad, m, and per second
-  Rigid3 camera_from_marker;
-};
 
 /// The best explanation of a disagreement between joints and images.
 struct Explanation {
@@ -40,6 +31,6 @@ struct Explanation {
 /// wrong; camera_from_rcm is wrong; camera_from_rcm changed at some time. Small errors of all numbers and of the
 /// images' delay are allowed in each, so that a cause is named only where these do not suffice and where no other
 /// explains the data nearly as well. `seen` in order of time; the instrument needs camera_from_rcm.
-Explanation explain_disagreement(const std::vector<JointsAndMarker>& seen, const Instrument& instrument);
+Explanation explain_disagreement(const std::vector<MarkerSighting>& seen, const Instrument& instrument);
 
 }  // namespace lapservo::internal

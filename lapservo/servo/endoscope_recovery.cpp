@@ -29,21 +29,13 @@ const Eigen::Vector4d min_motion(3e-3, 3e-3, 2e-4, 8e-3);
 // A registration within these is good enough; images that are farther off contradict each other.
 constexpr double max_rms_px = 1, max_newest_rms_px = 3, max_sigma_m = 1e-3, max_sigma_rad = 0.02;
 
-Eigen::Matrix<double, 8, 1> edges_of(const ImageMeasurement& image) {
-  Eigen::Matrix<double, 8, 1> edges;
-  edges << image.ends_px.head<2>(), image.marker->inner_px, image.ends_px.tail<2>();
-  return edges;
-}
-
-template <class Sighting>
-bool moved(const Sighting& from, const Sighting& to) {
+bool moved(const MarkerSighting& from, const MarkerSighting& to) {
   return ((to.q - from.q).array().abs() >= min_motion.array()).any();
 }
 
 // The last one is always the newest, so that what an endoscope does while the instrument rests leaves one sighting
 // only. Where there are many, half of them are enough to go on with.
-template <class Sighting>
-void add(std::vector<Sighting>& sightings, const Sighting& seen, std::size_t most) {
+void add(std::vector<MarkerSighting>& sightings, const MarkerSighting& seen, std::size_t most) {
   const std::size_t count = sightings.size();
   if (count >= 2 && !moved(sightings[count - 2], seen)) sightings.pop_back();
   if (sightings.size() == most) {
@@ -54,12 +46,17 @@ void add(std::vector<Sighting>& sightings, const Sighting& seen, std::size_t mos
   sightings.push_back(seen);
 }
 
+MarkerSighting sighting(const ImageMeasurement& image, const Measured& measured) {
+  return {image.time_s, measured.q, measured.rate, *image.camera_from_marker};
+}
+
 bool contradicts_itself(const RegistrationFit& fit) {
   return !(fit.rms_px < max_rms_px && fit.newest_rms_px < max_newest_rms_px);
 }
 
 bool is_certain(const RegistrationFit& fit) {
-  return fit.sigma_position_m < max_sigma_m && fit.sigma_rotation_rad < max_sigma_rad;
+  const auto variances = fit.covariance.diagonal();
+  return std::sqrt(variances.head<3>().sum()) < max_sigma_m && std::sqrt(variances.tail<3>().sum()) < max_sigma_rad;
 }
 
 }  // namespace
@@ -75,7 +72,7 @@ void EndoscopeRecovery::see(const ServoInput& input, VisualController& controlle
   const auto& image = input.image;
   if (!image) return;
   const bool silent = image->time_s < joints_from_s_ || image->time_s > joints_s_ + silent_s;
-  if (silent || (!image->found && !image->marker)) return drop_suspicion(controller);
+  if (silent || (!image->found && !image->camera_from_marker)) return drop_suspicion(controller);
   // An image that repeats is no moved endoscope: that would show another one.
   if (!follow_joints(*image, controller) || image->repetition != Repetition::none) return;
   collect(*image, controller);
@@ -84,9 +81,8 @@ void EndoscopeRecovery::see(const ServoInput& input, VisualController& controlle
 }
 
 void EndoscopeRecovery::collect(const ImageMeasurement& image, VisualController& controller) {
-  if (!image.marker || !sees_from_start_) return;
-  const Rigid3 camera_from_marker{image.marker->rotation, image.marker->position_m};
-  add(seen_, JointsAndMarker{image.time_s, measured_->q, measured_->rate, camera_from_marker}, max_compared);
+  if (!image.camera_from_marker || !sees_from_start_) return;
+  add(seen_, sighting(image, *measured_), max_compared);
   // The operator's motion may show which number it is.
   if (const auto why = wrong_rig(); why && why->cause == Explanation::Cause::rig && seen_.size() >= explain_at_)
     blames_rig(controller, Blame::named);
@@ -111,9 +107,9 @@ std::optional<Explanation> EndoscopeRecovery::wrong_rig() const {
 // Without a marker there would be nothing to measure with.
 void EndoscopeRecovery::watch(Watching& watching, const ImageMeasurement& image, VisualController& controller) {
   const bool moves = stepped(image, controller.delay_is_known());
-  const bool contradicts = image.marker && (!image.q || jumped(watching, *image.q));
+  const bool contradicts = image.camera_from_marker && (!image.q || jumped(watching, *image.q));
   watching.contradicting = contradicts ? watching.contradicting + 1 : 0;
-  if (!contradicts && !(moves && image.marker)) return drop_suspicion(controller);
+  if (!contradicts && !(moves && image.camera_from_marker)) return drop_suspicion(controller);
   if (agreeing_ < agreed_after) return;
   if (watching.contradicting >= moved_after)
     return blames_rig(controller, Blame::any) ? void() : notice(watching, controller);
@@ -233,14 +229,11 @@ void EndoscopeRecovery::measure(VisualController& controller) {
 }
 
 std::optional<MarkerSighting> EndoscopeRecovery::sighting_of(const ImageMeasurement& image) const {
-  if (!image.marker || !measured_ || measured_->stamp_s != image.time_s) return std::nullopt;
-  MarkerSighting sighting;
-  sighting.edges_px = edges_of(image);
-  sighting.camera_from_marker = {image.marker->rotation, image.marker->position_m};
-  sighting.q = measured_->q + trusted_;
-  sighting.q_rate = measured_->rate;
-  sighting.path_index = path_.joints.size() - 1;
-  return sighting;
+  if (!image.camera_from_marker || !measured_ || measured_->stamp_s != image.time_s) return std::nullopt;
+  MarkerSighting seen = sighting(image, *measured_);
+  seen.q += trusted_;
+  seen.path_index = path_.joints.size() - 1;
+  return seen;
 }
 
 void EndoscopeRecovery::wait_for_motion(WaitingForMotion& waiting, const MarkerSighting& seen,
@@ -261,8 +254,7 @@ void EndoscopeRecovery::wait_for_motion(WaitingForMotion& waiting, const MarkerS
 }
 
 std::optional<RegistrationFit> EndoscopeRecovery::fit(const Sightings& sightings) const {
-  const Marker& marker = rig_.instruments.front().marker;
-  return fit_registration(rig_.camera, marker, sightings, path_, camera_from_rcm_by(marker, sightings.back()));
+  return fit_registration(rig_.camera, rig_.instruments.front().marker, sightings, path_);
 }
 
 void EndoscopeRecovery::start(const WaitingForStart& waiting, VisualController& controller) {

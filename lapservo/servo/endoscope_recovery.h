@@ -106,7 +106,7 @@ class EndoscopeRecovery {
   int registration_ = 0;
   std::optional<Rigid3> camera_from_rcm_;
   std::variant<Watching, WaitingForMotion, WaitingForStart, WrongRig> state_;
-  std::vector<JointsAndMarker> seen_;            ///< since the loop has gone by this registration
+  endoscope::Sightings seen_;                    ///< since the loop has gone by this registration
   bool sees_from_start_ = true;                  ///< nothing but that made joints or images doubtful since then
   std::size_t explain_at_ = 0;                   ///< so many
   int agreeing_ = 0;                             ///< images so far, at most 10

@@ -55,9 +55,7 @@ ImageMeasurement measurement_of(const Observation& observation, double stamp_s,
   measurement.covariance += min_sigma.cwiseAbs2().asDiagonal();
   measurement.found = rcm_px && measurement.covariance.allFinite();
   if (observation.rcm) measurement.q = observation.rcm->q.vector();
-  if (const auto& seen = observation.marker)
-    measurement.marker = SeenMarker{both_ends(edges_px[1], edges_px[2]), seen->camera_from_marker.translation,
-                                    seen->camera_from_marker.rotation};
+  if (const auto& seen = observation.marker) measurement.camera_from_marker = seen->camera_from_marker;
   return measurement;
 }
 

@@ -20,7 +20,6 @@ constexpr Names rates{"s_rad_s", "r_px_s", "l_px_s", "d_px_s"};
 constexpr Names accelerations{"s_rad_s2", "r_px_s2", "l_px_s2", "d_px_s2"};
 constexpr auto joints = JointVector::names;
 constexpr Names joint_rates{"theta_rad_s", "phi_rad_s", "rho_m_s", "psi_rad_s"};
-constexpr Names inner{"e1_u_px", "e1_v_px", "e2_u_px", "e2_v_px"};
 constexpr std::array<std::string_view, 3> positions{"x_m", "y_m", "z_m"};
 constexpr Names rotations{"qx", "qy", "qz", "qw"};
 constexpr Names ends{"e0_u_px", "e0_v_px", "e3_u_px", "e3_v_px"};
@@ -55,7 +54,6 @@ std::vector<std::string> make_input_columns() {
     for (int j = i; j < 4; ++j) columns.push_back(covariance_column(i, j));
   name(columns, "seen_", ends);
   name(columns, "seen_", joints);
-  name(columns, "seen_", inner);
   name(columns, "seen_marker_", positions);
   name(columns, "seen_marker_", rotations);
   name(columns, "desired_", features);
@@ -88,21 +86,20 @@ void write(std::vector<std::string>& fields, const Rigid3& pose) {
 }
 
 void write_image(std::vector<std::string>& fields, const std::optional<ImageMeasurement>& image) {
-  constexpr int numbers = 4 + 10 + 4 + 4, of_marker = 4 + 7;
-  fields.emplace_back(!image ? "none" : image->found ? "found" : image->marker ? "marker" : "lost");
+  constexpr int numbers = 4 + 10 + 4 + 4, of_marker = 7;
+  fields.emplace_back(!image ? "none" : image->found ? "found" : image->camera_from_marker ? "marker" : "lost");
   if (!image) return leave_empty(fields, 3 + numbers + of_marker);
   write(fields, image->time_s);
   fields.push_back(fmt::format("{}", image->registration));
   fields.emplace_back(to_string(image->repetition));
-  if (!image->found && !image->marker) return leave_empty(fields, numbers + of_marker);
+  if (!image->found && !image->camera_from_marker) return leave_empty(fields, numbers + of_marker);
   write(fields, image->features);
   for (int i = 0; i < 4; ++i)
     for (int j = i; j < 4; ++j) write(fields, image->covariance(i, j));
   write(fields, image->ends_px);
   image->q ? write(fields, *image->q) : leave_empty(fields, 4);
-  if (!image->marker) return leave_empty(fields, of_marker);
-  write(fields, image->marker->inner_px);
-  write(fields, Rigid3{image->marker->rotation, image->marker->position_m});
+  if (!image->camera_from_marker) return leave_empty(fields, of_marker);
+  write(fields, *image->camera_from_marker);
 }
 
 // time_s theta_rad phi_rad rho_m psi_rad; time_s ...
@@ -201,11 +198,10 @@ std::optional<ImageMeasurement> read_image(const Row& row) {
   image.ends_px = row.numbers("seen_", ends);
   if (!row.text("seen_theta_rad").empty()) image.q = row.numbers("seen_", joints);
   if (row.text("seen_marker_x_m").empty()) return image;
-  image.marker.emplace();
-  image.marker->inner_px = row.numbers("seen_", inner);
+  Rigid3& seen = image.camera_from_marker.emplace();
   for (int i = 0; i < 3; ++i)
-    image.marker->position_m[i] = row.number("seen_marker_" + std::string(positions[static_cast<std::size_t>(i)]));
-  image.marker->rotation.coeffs() = row.numbers("seen_marker_", rotations);
+    seen.translation[i] = row.number("seen_marker_" + std::string(positions[static_cast<std::size_t>(i)]));
+  seen.rotation.coeffs() = row.numbers("seen_marker_", rotations);
   return image;
 }
 

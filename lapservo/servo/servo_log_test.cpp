@@ -48,7 +48,7 @@ Record any_record(Random& random, int kind) {
     image.repetition = static_cast<Repetition>(kind % 3);
     if (kind % 4 == 3) {
       const Eigen::Vector4d position = any(random);
-      image.marker = SeenMarker{any(random), position.head<3>(), Eigen::Quaterniond(any(random))};
+      image.camera_from_marker = Rigid3{Eigen::Quaterniond(any(random)), position.head<3>()};
       image.features = any(random), image.covariance.setZero(), image.ends_px = any(random);
     }
     if (image.found) {
@@ -88,13 +88,12 @@ void expect_same_bits(const ServoInput& a, const ServoInput& b) {
   EXPECT_EQ(a.image->time_s, b.image->time_s);
   EXPECT_EQ(a.image->registration, b.image->registration);
   EXPECT_EQ(a.image->repetition, b.image->repetition);
-  ASSERT_EQ(a.image->marker.has_value(), b.image->marker.has_value());
-  if (a.image->marker) {
-    EXPECT_EQ(a.image->marker->inner_px, b.image->marker->inner_px);
-    EXPECT_EQ(a.image->marker->position_m, b.image->marker->position_m);
-    EXPECT_EQ(a.image->marker->rotation.coeffs(), b.image->marker->rotation.coeffs());
+  ASSERT_EQ(a.image->camera_from_marker.has_value(), b.image->camera_from_marker.has_value());
+  if (const auto& seen = a.image->camera_from_marker) {
+    EXPECT_EQ(seen->translation, b.image->camera_from_marker->translation);
+    EXPECT_EQ(seen->rotation.coeffs(), b.image->camera_from_marker->rotation.coeffs());
   }
-  if (!a.image->found && !a.image->marker) return;
+  if (!a.image->found && !a.image->camera_from_marker) return;
   EXPECT_EQ(a.image->features, b.image->features);
   EXPECT_EQ(a.image->covariance, b.image->covariance);
   EXPECT_EQ(a.image->ends_px, b.image->ends_px);

@@ -277,9 +277,7 @@ class MovedEndoscope {
     const bool fits = believed && (believed->translation - camera_from_rcm_.translation).norm() < 1e-3;
     if (fits && tells_q) image.q = q_shown_ + seen_off;
     const Rigid3 pose = camera_from_marker(marker, unrolled, q_shown_[3]);
-    SeenMarker seen{{}, pose.translation, pose.rotation};
-    seen.inner_px << edges_px[1], edges_px[2];
-    if (tells_marker) image.marker = seen;
+    if (tells_marker) image.camera_from_marker = pose;
     return image;
   }
 
