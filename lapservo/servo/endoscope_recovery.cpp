@@ -15,6 +15,9 @@ constexpr int agreed_after = 10, moved_after = 2;
 // Largest believable motion of theta, phi (rad), rho (m) against the joints, from one image to the next.
 const Eigen::Vector3d max_jump(0.03, 0.03, 0.003);
 
+// By so much a shaft misfits the RCM of an endoscope that moved, while the offset moves, and where it is not seen to.
+constexpr double moving_misfit_rad = 1.7e-3, plain_misfit_rad = 5e-3;
+
 // Offsets from so long ago are those of before the endoscope began to move.
 constexpr double offset_age_s = 0.7, offset_memory_s = 1.5;
 
@@ -48,6 +51,12 @@ void add(std::vector<MarkerSighting>& sightings, const MarkerSighting& seen, std
 
 MarkerSighting sighting(const ImageMeasurement& image, const Measured& measured) {
   return {image.time_s, measured.q, measured.rate, *image.camera_from_marker};
+}
+
+// A registration that is a little wrong misfits from the start, by more and less as the arm moves.
+double most_misfit_rad(const Watching& watching, bool moves) {
+  const double agreed_rad = watching.offsets.empty() ? 0 : watching.offsets.front().misfit_rad;
+  return std::max(moves ? moving_misfit_rad : plain_misfit_rad, 2 * agreed_rad);
 }
 
 bool contradicts_itself(const RegistrationFit& fit) {
@@ -106,10 +115,14 @@ std::optional<Explanation> EndoscopeRecovery::wrong_rig() const {
 
 // Without a marker there would be nothing to measure with.
 void EndoscopeRecovery::watch(Watching& watching, const ImageMeasurement& image, VisualController& controller) {
+  const Eigen::Vector4d& before = watching.offsets.empty() ? trusted_ : watching.offsets.back().q;
+  seen_joints_ = image.camera_from_marker ? seen_joints(rig_.camera, instrument(), sighting(image, *measured_), before)
+                                          : std::nullopt;
   const bool moves = stepped(image, controller.delay_is_known());
-  const bool contradicts = image.camera_from_marker && (!image.q || jumped(watching, *image.q));
+  const bool contradicts = seen_joints_ && (seen_joints_->misfit_rad > most_misfit_rad(watching, moves) ||
+                                            jumped(seen_joints_->offset - before));
   watching.contradicting = contradicts ? watching.contradicting + 1 : 0;
-  if (!contradicts && !(moves && image.camera_from_marker)) return drop_suspicion(controller);
+  if (!contradicts && !moves) return drop_suspicion(controller);
   if (agreeing_ < agreed_after) return;
   if (watching.contradicting >= moved_after)
     return blames_rig(controller, Blame::any) ? void() : notice(watching, controller);
@@ -126,13 +139,17 @@ void EndoscopeRecovery::drop_suspicion(VisualController& controller) {
 }
 
 bool EndoscopeRecovery::stepped(const ImageMeasurement& image, bool delay_is_known) {
-  if (!image.q) steps_.interrupt();
   if (image.registration != registration_of_steps_) steps_.drop_latest();
   registration_of_steps_ = image.registration;
-  if (!image.q) return false;
-  return steps_.add(
-      {measured_->stamp_s, measured_->q.head<3>(), measured_->rate.head<3>(), (*image.q - measured_->q).head<3>()},
-      delay_is_known);
+  if (!seen_joints_) {
+    steps_.interrupt();
+    return false;
+  }
+  SeenOffset now{measured_->stamp_s};
+  now.measured.head<3>() = measured_->q.head<3>(), now.rate_per_s.head<3>() = measured_->rate.head<3>();
+  now.offset << seen_joints_->offset.head<3>(), seen_joints_->misfit_rad;
+  now.covariance.topLeftCorner<3, 3>() = seen_joints_->covariance.topLeftCorner<3, 3>();
+  return steps_.add(now, delay_is_known);
 }
 
 void EndoscopeRecovery::doubt(HoldReason reason, VisualController& controller) {
@@ -152,10 +169,8 @@ void EndoscopeRecovery::doubt(HoldReason reason, VisualController& controller) {
 }
 
 // A turn about the RCM looks like a jump of the joints, which these would have shown.
-bool EndoscopeRecovery::jumped(const Watching& watching, const Eigen::Vector4d& q_seen) const {
-  const Eigen::Vector4d& before = watching.offsets.empty() ? trusted_ : watching.offsets.back().q;
-  const Eigen::Vector4d off = q_seen - measured_->q - before;
-  return (off.head<3>().cwiseAbs().array() > max_jump.array()).any();
+bool EndoscopeRecovery::jumped(const Eigen::Vector4d& by) {
+  return (by.head<3>().cwiseAbs().array() > max_jump.array()).any();
 }
 
 bool EndoscopeRecovery::follow_joints(const ImageMeasurement& image, VisualController& controller) {
@@ -196,7 +211,8 @@ void EndoscopeRecovery::trust(Watching& watching, const ServoInput& input, const
   if (!image || !image->found || !image->q || step.action != ControlAction::track || !step.estimate || !measured_)
     return;
   agreeing_ = std::min(agreeing_ + 1, agreed_after);
-  watching.offsets.push_back({input.time_s, step.estimate->q - input.joints.q.vector(), *measured_});
+  watching.offsets.push_back({input.time_s, step.estimate->q - input.joints.q.vector(), *measured_,
+                              seen_joints_ ? seen_joints_->misfit_rad : 0});
   while (input.time_s - watching.offsets.front().time_s > offset_memory_s) watching.offsets.pop_front();
 }
 

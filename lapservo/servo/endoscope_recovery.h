@@ -30,6 +30,7 @@ struct Offset {
   double time_s = 0;
   Eigen::Vector4d q = Eigen::Vector4d::Zero();  ///< of the instrument from the measured joints
   Measured measured;
+  double misfit_rad = 0;  ///< SeenJoints'
 };
 using Sightings = std::vector<MarkerSighting>;
 
@@ -51,12 +52,13 @@ struct WrongRig {
 
 }  // namespace endoscope
 
-/// Notices that the endoscope moved, and measures camera_from_rcm anew. Noticed is that images which showed q, in
-/// agreement with the joints, show the marker as well as before but nowhere where its shaft passes the RCM, or where
-/// the joints are not: not what hides a marker, freezes an image, sets an encoder or blocks a joint does. From then on
-/// the arm is the operator's. A rig that was wrong from the start (explain_disagreement()) is no moved endoscope: the
-/// arm is held for good. Images and measured joints of the motion that the operator makes give camera_from_rcm;
-/// the loop goes by it after JointState::started, unless the newest image contradicts it.
+/// Notices that the endoscope moved, and measures camera_from_rcm anew. Images which agreed with the joints then show
+/// the marker as well as before, but where the joints are not, or on a shaft that misses the RCM by more than before
+/// (seen_joints()): what hides a marker, freezes an image, sets an encoder or blocks a joint does not do that, nor does
+/// a registration that was a little wrong from the start. From then on the arm is the operator's. A rig that was wrong
+/// from the start (explain_disagreement()) is no moved endoscope: the arm is held for good. Images and measured joints
+/// of the motion that the operator makes give camera_from_rcm; the loop goes by it after JointState::started, unless
+/// the newest image contradicts it.
 class EndoscopeRecovery {
  public:
   explicit EndoscopeRecovery(const Rig& rig);
@@ -87,7 +89,7 @@ class EndoscopeRecovery {
   void collect(const ImageMeasurement& image, VisualController& controller);
   enum class Blame { any, named, sign };  ///< whatever of the rig is wrong; one number; one joint's sign
   bool blames_rig(VisualController& controller, Blame wanted);
-  bool jumped(const Watching& watching, const Eigen::Vector4d& q_seen) const;
+  static bool jumped(const Eigen::Vector4d& by);
   bool stepped(const ImageMeasurement& image, bool delay_is_known);
   void watch(Watching& watching, const ImageMeasurement& image, VisualController& controller);
   void notice(Watching& watching, VisualController& controller);
@@ -111,6 +113,7 @@ class EndoscopeRecovery {
   std::size_t explain_at_ = 0;                   ///< so many
   int agreeing_ = 0;                             ///< images so far, at most 10
   std::optional<endoscope::Measured> measured_;  ///< at the latest image
+  std::optional<SeenJoints> seen_joints_;        ///< in it, by the registration that the loop goes by
   double joints_s_ = 0, joints_from_s_ = 0;      ///< when the joints were read last, and first after the last silence
   OffsetSteps steps_;                            ///< of images that showed q
   int registration_of_steps_ = 0;

@@ -1,19 +1,23 @@
 #include "lapservo/servo/offset_steps.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+
+#include "lapservo/core/dense_matrix.h"
 
 namespace lapservo::internal {
 namespace {
 
 constexpr double memory_s = 0.1;
 
-// Smaller steps are insignificant: theta, phi (rad), rho (m), of which this is also the scale.
-const Eigen::Array3d min_step(7.5e-4, 7.5e-4, 1.5e-4);
-// Fractions of the path of the joints: a wrong registration or lens, and for rho all of its play. A step that is
+// Standard deviations: of a step at least (rad, rad, m, rad); of late stamps beside their scatter; of a delay that is a
+// guess, and of one that is known.
+const Eigen::Array4d least_sigma(1.25e-4, 1.25e-4, 2.5e-5, 5e-5);
+constexpr double late_s = 0.001, guessed_delay_s = 0.08, known_delay_s = 0.01;
+
+// As parts of the path of the joints: by a wrong registration or lens, and for rho by all of its play. A step that is
 // proportional to the path is no moved endoscope.
-const Eigen::Array3d of_path(0.1, 0.1, 0.5), of_path_suspected(0.5, 0.5, 0.5);
+const Eigen::Array4d of_path(0.017, 0.017, 0.083, 5e-4), of_path_suspected(0.083, 0.083, 0.083, 2e-3);
 constexpr double unusual = 6, weight = 0.05;
 
 // A gradual change is learnt so much later.
@@ -21,11 +25,6 @@ constexpr double learnt_after_s = 0.5;
 
 // One joint's own is what the others show less of than this part of it, beside their path and what is usual.
 constexpr double beside = 0.02, beside_of_path = 0.005, beside_usual = 2;
-
-// By how much stamps are off, beyond four times what they usually are, up to the time between two images.
-constexpr double min_late_s = 0.002, usual_lates = 4;
-// By how much the delay is off at most, where it is a guess, and where it is known.
-constexpr double guessed_delay_s = 0.15, known_delay_s = 0.02;
 
 }  // namespace
 
@@ -36,13 +35,10 @@ bool OffsetSteps::add(const SeenOffset& offset, bool delay_is_known) {
   // A stamp that is missing or not newer carries no information.
   if (!seen_.empty() && !(offset.stamp_s > seen_.back().at.stamp_s)) return false;
   if (!latest_.empty() && !(offset.stamp_s > latest_.back().stamp_s)) latest_.clear();
-  const bool usual_before = latest(false) != nullptr;
-  const Seen *const last = latest(!usual_before), *const first = oldest(!usual_before);
-  if (last) {
-    const Changes changes{offset.stamp_s, change(*last, now, from_latest_, delay_is_known),
-                          change(*first, now, from_oldest_, delay_is_known)};
-    now.unusual = is_unusual(changes.from_latest, from_latest_) || is_unusual(changes.from_oldest, from_oldest_);
-    if (!now.unusual) learn(changes, delay_is_known);
+  if (!seen_.empty()) {
+    const Change step = change(oldest(), now, delay_is_known);
+    now.unusual = step.sigmas > unusual;
+    if (!now.unusual) learn(step, delay_is_known);
   }
   // It is there again, or rests elsewhere.
   if (!now.unusual) std::erase_if(seen_, [](const Seen& seen) { return seen.unusual; });
@@ -51,78 +47,57 @@ bool OffsetSteps::add(const SeenOffset& offset, bool delay_is_known) {
 }
 
 // While the delay is a guess, what that makes of motion can't wait.
-void OffsetSteps::learn(const Changes& changes, bool delay_is_known) {
-  const auto learn_one = [](Usual& usual, const Change& seen) {
-    usual.step_squared += weight * (seen.unexplained.square() - usual.step_squared);
-    usual.late_s2 += weight * (seen.late_s * seen.late_s - usual.late_s2);
+void OffsetSteps::learn(const Change& change, bool delay_is_known) {
+  const auto learn_now = [this](const Change& seen) {
+    step_squared_ += weight * (seen.unexplained.square() - step_squared_);
+    late_s2_ += weight * (seen.late_s * seen.late_s - late_s2_);
   };
-  const auto learn_all = [&](const Changes& seen) {
-    learn_one(from_latest_, seen.from_latest), learn_one(from_oldest_, seen.from_oldest);
-  };
-  if (!delay_is_known || is_of_one_joint(changes.from_oldest)) return learn_all(changes);
-  latest_.push_back(changes);
-  while (changes.stamp_s - latest_.front().stamp_s > learnt_after_s) {
-    learn_all(latest_.front());
+  if (!delay_is_known || is_of_one_joint(change)) return learn_now(change);
+  latest_.push_back(change);
+  while (change.stamp_s - latest_.front().stamp_s > learnt_after_s) {
+    learn_now(latest_.front());
     latest_.pop_front();
   }
 }
 
 bool OffsetSteps::is_of_one_joint(const Change& change) const {
-  const Eigen::Array3d expected = beside_usual * from_oldest_.step_squared.sqrt() + beside_of_path * change.path;
-  const auto of_one = [&](const Eigen::Array3d& step) {
+  const Eigen::Array4d expected = beside_usual * step_squared_.sqrt() + beside_of_path * change.path;
+  const auto of_one = [&](const Eigen::Array4d& step) {
     Eigen::Index most = 0;
-    const Eigen::Array3d size = step.abs() / min_step;
+    const Eigen::Array4d size = step.abs() / least_sigma;
     const double allowed = beside * size.maxCoeff(&most);
-    Eigen::Array3d others = (step.abs() - expected) / min_step;
+    Eigen::Array4d others = (step.abs() - expected) / least_sigma;
     others[most] = 0;
     return others.maxCoeff() < allowed;
   };
   return of_one(change.unexplained) || of_one(change.seen);
 }
 
-const OffsetSteps::Seen* OffsetSteps::latest(bool unusual_ones) const {
-  const auto found =
-      std::find_if(seen_.rbegin(), seen_.rend(), [=](const Seen& seen) { return seen.unusual == unusual_ones; });
-  return found == seen_.rend() ? nullptr : &*found;
-}
-
-const OffsetSteps::Seen* OffsetSteps::oldest(bool unusual_ones) const {
-  const auto found =
-      std::find_if(seen_.begin(), seen_.end(), [=](const Seen& seen) { return seen.unusual == unusual_ones; });
-  return found == seen_.end() ? nullptr : &*found;
+// The oldest usual one; where none is, the oldest.
+const OffsetSteps::Seen& OffsetSteps::oldest() const {
+  const auto found = std::find_if(seen_.begin(), seen_.end(), [](const Seen& seen) { return !seen.unusual; });
+  return found == seen_.end() ? seen_.front() : *found;
 }
 
 // A late image shows the joints at another time: all of them off along their motion; a wrong delay does the same where
-// the motion changed. The best explanation by the two is subtracted, by turns, each within its bounds.
-OffsetSteps::Change OffsetSteps::change(const Seen& before, const Seen& now, const Usual& usual,
-                                        bool delay_is_known) const {
-  const Eigen::Array3d step = (now.at.offset - before.at.offset).array() / min_step;
-  const std::array<Eigen::Array3d, 2> per_s{now.at.rate_per_s.array() / min_step,
-                                            (now.at.rate_per_s - before.at.rate_per_s).array() / min_step};
-  const double apart_s = now.at.stamp_s - seen_.back().at.stamp_s;
-  const std::array<double, 2> most_s{std::min(apart_s, min_late_s + usual_lates * std::sqrt(usual.late_s2)),
-                                     delay_is_known ? known_delay_s : guessed_delay_s};
-  std::array<double, 2> by_s{};
-  Eigen::Array3d left = step;
-  constexpr int turns = 4;
-  for (int turn = 0; turn < turns; ++turn)
-    for (std::size_t k = 0; k < by_s.size(); ++k) {
-      const double square = per_s[k].square().sum();
-      if (!(square > 0)) continue;
-      const double wanted_s = by_s[k] + (per_s[k] * left).sum() / square;
-      const double next_s = std::clamp(wanted_s, -most_s[k], most_s[k]);
-      left -= (next_s - by_s[k]) * per_s[k];
-      by_s[k] = next_s;
-    }
-  Eigen::Array3d path = (now.path - before.path).array();
-  path.head<2>() = path.head<2>().maxCoeff();  // theta's and phi's, where the frame is off
-  return {step * min_step, left * min_step, path, by_s[0]};
-}
-
-bool OffsetSteps::is_unusual(const Change& change, const Usual& usual) const {
-  const Eigen::Array3d& share = seen_.back().unusual ? of_path_suspected : of_path;
-  const Eigen::Array3d expected = unusual * usual.step_squared.sqrt() + share * change.path;
-  return (change.unexplained.abs() > min_step + expected).any();
+// the motion changed.
+OffsetSteps::Change OffsetSteps::change(const Seen& before, const Seen& now, bool delay_is_known) const {
+  const Eigen::Vector4d rate = now.at.rate_per_s, rates = now.at.rate_per_s - before.at.rate_per_s;
+  Change change{now.at.stamp_s};
+  change.seen = now.at.offset - before.at.offset;
+  const Eigen::Vector4d path = now.path - before.path;
+  const double turned = path.head<2>().maxCoeff();  // theta's and phi's, where the frame is off
+  change.path << turned, turned, path[2], turned;
+  const Eigen::Array4d& share = seen_.back().unusual ? of_path_suspected : of_path;
+  const double late = late_s * late_s + late_s2_, delay_s = delay_is_known ? known_delay_s : guessed_delay_s;
+  Eigen::Matrix4d covariance = before.at.covariance + now.at.covariance + late * rate * rate.transpose() +
+                               delay_s * delay_s * rates * rates.transpose();
+  covariance.diagonal().array() += least_sigma.square() + step_squared_ + (share * change.path).square();
+  const Eigen::Vector4d weighed = solve_symmetric(covariance, change.seen.matrix());
+  change.sigmas = std::sqrt(change.seen.matrix().dot(weighed));
+  change.late_s = late * rate.dot(weighed);
+  change.unexplained = change.seen.matrix() - change.late_s * rate - delay_s * delay_s * rates.dot(weighed) * rates;
+  return change;
 }
 
 }  // namespace lapservo::internal

@@ -7,11 +7,13 @@
 namespace lapservo::internal {
 
 /// The joints at one image, theta, phi (rad) and rho (m): their measurement at its exposure, their speed since the
-/// previous image, and the distance from there at which the image shows the instrument.
+/// previous image, and the distance from there at which the image shows the instrument. Fourth: by how much the image
+/// misfits any joints (rad), since the shaft does not pass the RCM.
 struct SeenOffset {
   double stamp_s = 0;
-  Eigen::Vector3d measured = Eigen::Vector3d::Zero(), rate_per_s = Eigen::Vector3d::Zero();
-  Eigen::Vector3d offset = Eigen::Vector3d::Zero();
+  Eigen::Vector4d measured = Eigen::Vector4d::Zero(), rate_per_s = Eigen::Vector4d::Zero();
+  Eigen::Vector4d offset = Eigen::Vector4d::Zero();
+  Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();  ///< of the offset, by the image's noise
 };
 
 /// Detects that the offset between images and joints changes faster than usual: an endoscope that moves slowly makes no
@@ -33,32 +35,24 @@ class OffsetSteps {
   struct Seen {
     SeenOffset at;
     bool unusual = false;
-    Eigen::Vector3d path = Eigen::Vector3d::Zero();  ///< that the joints have gone since the beginning, without sign
-  };
-  /// Statistics of one distance in time.
-  struct Usual {
-    Eigen::Array3d step_squared = Eigen::Array3d::Zero();
-    double late_s2 = 0;
+    Eigen::Vector4d path = Eigen::Vector4d::Zero();  ///< that the joints have gone since the beginning, without sign
   };
   struct Change {
-    Eigen::Array3d seen = Eigen::Array3d::Zero(), unexplained = Eigen::Array3d::Zero();
-    Eigen::Array3d path = Eigen::Array3d::Zero();  ///< which may have to do with it
-    double late_s = 0;                             ///< by which the image would have to be late or early
-  };
-  struct Changes {
     double stamp_s = 0;
-    Change from_latest{}, from_oldest{};
+    Eigen::Array4d seen = Eigen::Array4d::Zero(), unexplained = Eigen::Array4d::Zero();
+    Eigen::Array4d path = Eigen::Array4d::Zero();  ///< which may have to do with it
+    double late_s = 0;                             ///< by which the image is late or early, as likely as not
+    double sigmas = 0;                             ///< size of the step in units of its sigmas
   };
-  Change change(const Seen& before, const Seen& now, const Usual& usual, bool delay_is_known) const;
-  bool is_unusual(const Change& change, const Usual& usual) const;
+  Change change(const Seen& before, const Seen& now, bool delay_is_known) const;
   bool is_of_one_joint(const Change& change) const;
-  void learn(const Changes& changes, bool delay_is_known);
-  const Seen* latest(bool unusual) const;
-  const Seen* oldest(bool unusual) const;
+  void learn(const Change& change, bool delay_is_known);
+  const Seen& oldest() const;
 
-  std::deque<Seen> seen_;       ///< in order of time, of the last 0.1 s
-  std::deque<Changes> latest_;  ///< not learnt yet
-  Usual from_latest_, from_oldest_;
+  std::deque<Seen> seen_;                                 ///< in order of time, of the last 0.1 s
+  std::deque<Change> latest_;                             ///< not learnt yet
+  Eigen::Array4d step_squared_ = Eigen::Array4d::Zero();  ///< the usual one
+  double late_s2_ = 0;
 };
 
 }  // namespace lapservo::internal

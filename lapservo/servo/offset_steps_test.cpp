@@ -22,7 +22,10 @@ class Swing {
     const double t = period_s * count_++;
     const Eigen::Vector3d shown = at(t + late_s + random_.uniform(-jitter_s_, jitter_s_));
     const Eigen::Vector3d noise(3e-5 * random_.normal(), 3e-5 * random_.normal(), 3e-6 * random_.normal());
-    return {t, at(t), (at(t) - at(t - period_s)) / period_s, shown - at(t) + noise + offset};
+    SeenOffset seen{t};
+    seen.measured.head<3>() = at(t), seen.rate_per_s.head<3>() = (at(t) - at(t - period_s)) / period_s;
+    seen.offset.head<3>() = shown - at(t) + noise + offset;
+    return seen;
   }
 
  private:
@@ -148,11 +151,10 @@ int told_of_a_start(double phi_of_path, double delay_off_s, bool delay_is_known)
     const double moves_s = period_s * std::max(0, i - 120), before_s = period_s * std::max(0, i - 121);
     const double theta_rad = per_s * moves_s, rate_per_s = (theta_rad - per_s * before_s) / period_s;
     const Eigen::Vector3d noise(3e-5 * random.normal(), 3e-5 * random.normal(), 3e-6 * random.normal());
-    const bool unusual = steps.add({period_s * i,
-                                    {theta_rad, 0, 0},
-                                    {rate_per_s, 0, 0},
-                                    noise + Eigen::Vector3d(-rate_per_s * delay_off_s, phi_of_path * theta_rad, 0)},
-                                   delay_is_known);
+    SeenOffset seen{period_s * i};
+    seen.measured[0] = theta_rad, seen.rate_per_s[0] = rate_per_s;
+    seen.offset.head<3>() = noise + Eigen::Vector3d(-rate_per_s * delay_off_s, phi_of_path * theta_rad, 0);
+    const bool unusual = steps.add(seen, delay_is_known);
     told += unusual && i > 120;
   }
   return told;

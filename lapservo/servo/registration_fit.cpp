@@ -5,6 +5,7 @@
 
 #include <Eigen/QR>
 
+#include "lapservo/core/dense_matrix.h"
 #include "lapservo/geometry/rotation.h"
 #include "lapservo/kinematics/centre_line.h"
 #include "lapservo/kinematics/rcm_kinematics.h"
@@ -73,6 +74,30 @@ Rigid3 camera_from_rcm_by(const Marker& marker, const MarkerSighting& sighting) 
 }
 
 }  // namespace
+
+std::optional<SeenJoints> seen_joints(const Camera& camera, const Instrument& instrument,
+                                      const MarkerSighting& sighting, const Eigen::Vector4d& offset) {
+  constexpr int iterations = 3;
+  constexpr double step = 1e-6;
+  const Eigen::Matrix<double, 6, 6> whitening = whitening_of(camera, instrument.marker, sighting.camera_from_marker);
+  const auto errors = [&](const Eigen::Vector4d& at) -> Eigen::Matrix<double, 6, 1> {
+    const auto q = JointVector::from_vector(sighting.q + at);
+    const Rigid3 unrolled = *instrument.camera_from_rcm * rcm_from_unrolled(q);
+    return whitening *
+           pose_difference(camera_from_marker(instrument.marker, unrolled, q.psi_rad), sighting.camera_from_marker);
+  };
+  SeenJoints seen{offset};
+  Eigen::Matrix<double, 6, 4> slopes;
+  for (int i = 0; i < iterations; ++i) {
+    const Eigen::Matrix<double, 6, 1> at = errors(seen.offset);
+    for (int k = 0; k < 4; ++k) slopes.col(k) = (errors(seen.offset + step * Eigen::Vector4d::Unit(k)) - at) / step;
+    seen.covariance = inverse_of_symmetric(slopes.transpose() * slopes);
+    seen.offset -= seen.covariance * slopes.transpose() * at;
+    seen.misfit_rad = sigma_px / camera.fx_px * (at - slopes * (seen.covariance * slopes.transpose() * at)).norm();
+  }
+  if (!seen.offset.allFinite() || !seen.covariance.allFinite()) return std::nullopt;
+  return seen;
+}
 
 std::optional<RegistrationFit> fit_registration(const Camera& camera, const Marker& marker,
                                                 const std::vector<MarkerSighting>& sightings, const GapPath& path) {

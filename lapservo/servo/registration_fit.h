@@ -18,6 +18,17 @@ struct RegistrationFit {
   double newest_rms_px = 0;  ///< of the last sighting's alone
 };
 
+/// The offset from measured joints at which the boundaries' images show the instrument, whose shaft passes the RCM.
+struct SeenJoints {
+  Eigen::Vector4d offset = Eigen::Vector4d::Zero();      ///< theta, phi (rad), rho (m), psi (rad)
+  Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();  ///< by the images' noise alone
+  double misfit_rad = 0;  ///< angle between the images at that offset and those seen: root of the sum of their squares
+};
+
+/// From `offset` on. Nullopt where the marker's boundaries do not show it.
+std::optional<SeenJoints> seen_joints(const Camera& camera, const Instrument& instrument,
+                                      const MarkerSighting& sighting, const Eigen::Vector4d& offset);
+
 /// camera_from_rcm by the boundaries' images where the joints are known to small offsets of phi, rho and psi, the delay
 /// and the gaps of rho and psi. Nullopt where the sightings do not determine it.
 std::optional<RegistrationFit> fit_registration(const Camera& camera, const Marker& marker,

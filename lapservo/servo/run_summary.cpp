@@ -7,6 +7,7 @@
 
 #include "lapservo/control/tracking_law.h"
 #include "lapservo/core/angles.h"
+#include "lapservo/rig/registration_text.h"
 
 namespace lapservo::internal {
 namespace {
@@ -88,9 +89,9 @@ std::string RunSummary::holds_text() const {
   if (held_at_end_) text += "\nended in a hold: " + *held_at_end_;
   if (contradicted_ > 0)
     text += fmt::format(
-        "\nregistration_contradicted in {} of {} ticks: the images fit neither camera_from_rcm nor lens "
-        "of the rig, and r is off by what is wrong with them",
-        contradicted_, ticks_);
+        "\nregistration_contradicted in {} of {} ticks: {}, since camera_from_rcm or the lens is wrong, and r is off "
+        "by that: {}",
+        contradicted_, ticks_, misses_rcm_text, measure_registration_text);
   return text;
 }
 

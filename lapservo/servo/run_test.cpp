@@ -5,6 +5,8 @@
 #include <chrono>
 #include <cmath>
 #include <condition_variable>
+#include <cstdio>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -29,6 +31,7 @@
 #include "lapservo/servo/servo_log.h"
 #include "lapservo/sim/arm.h"
 #include "lapservo/sim/simulator.h"
+#include "lapservo/testing/environment.h"
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/rigs.h"
 #include "lapservo/testing/temporary_folder.h"
@@ -59,6 +62,7 @@ struct Case {
   std::vector<Blotch> blotches{};
   std::optional<Interval> dark{};
   double start_s = 1e9;  ///< then somebody says start
+  std::function<void(SimulatorConfig&)> change{};
 };
 
 struct Record {
@@ -243,6 +247,7 @@ PastRun run_case(const Case& c) {
   simulated.endoscope.exposure_s = c.exposure_s;
   simulated.render.smoke = c.smoke;
   simulated.blotches = c.blotches;
+  if (c.change) c.change(simulated);
   Random random(c.seed);
   const Trajectory trajectory = small_trajectory();
   Simulator simulator(rig, simulated,
@@ -514,8 +519,69 @@ double beside_m(const Rig& rig, const InstrumentTruth& truth, const Rigid3& came
   return (camera_from_first_camera * first - first).norm();
 }
 
-// From rest to rest it shows little at first and gains speed from image to image.
-TEST(Run, HoldsAnEndoscopeThatMovesSmoothlyWhenThatIsPlain) {
+// Times of holds since the endoscope began to move, and since that is plain: the marker lies 0.5 mm beside.
+struct HeldAfter {
+  int runs = 0, in_time = 0;
+  double held_s = 0, plain_s = 0, latest_plain_s = -1;
+
+  void add(const Rig& rig, const Case& c) {
+    constexpr double in_time_s = 0.1;
+    const PastRun done = run_case(c);
+    const ControllerConfig controller = config_of(rig, c).controller;
+    std::optional<double> plain, held;
+    for (const Record& record : done.records) {
+      const double since_s = record.input.time_s - endoscope_moves_s;
+      const bool shown = since_s > c.latency_s - 0.01;
+      if (since_s > -1 && !shown) {
+        EXPECT_NE(record.decision.control.reason, HoldReason::endoscope_moved) << since_s;
+      }
+      if (since_s < 0) continue;
+      if (!plain && beside_m(rig, record.truth, record.camera_from_first_camera) > 5e-4) plain = since_s;
+      if (!held && shown && record.decision.control.action == ControlAction::hold) held = since_s;
+    }
+    ASSERT_TRUE(plain && held);
+    expect_within_limits(done, controller);
+    ++runs, held_s += *held, plain_s += *held - *plain;
+    latest_plain_s = std::max(latest_plain_s, *held - *plain);
+    in_time += *held - *plain <= in_time_s + controller.period_s;
+  }
+};
+
+int endoscopes() {
+  return testing::from_environment("LAPSERVO_ENDOSCOPES", 1);
+}
+std::uint64_t endoscope_seed() {
+  return static_cast<std::uint64_t>(testing::from_environment("LAPSERVO_ENDOSCOPE_SEED", 1));
+}
+
+// An even motion is plain at once; from rest to rest it shows little at first and gains speed from image to image.
+// LAPSERVO_ENDOSCOPES=10 LAPSERVO_ENDOSCOPE_SEED=2: ten of each, and others.
+TEST(Run, HoldsAnEndoscopeThatMovesWhenThatIsPlain) {
+  const Rig rig = testing::small_test_rig();
+  Random random(endoscope_seed());
+  for (const auto profile : {MotionProfile::even, MotionProfile::smooth})
+    for (const double duration_s : {0.0, 0.6, 1.0, 2.0, 4.0}) {
+      if (profile == MotionProfile::smooth && duration_s == 0) continue;
+      const char* name = profile == MotionProfile::smooth ? "smooth" : "even";
+      SCOPED_TRACE(::testing::Message() << name << " " << duration_s);
+      HeldAfter after;
+      for (int i = 0; i < endoscopes(); ++i) {
+        Case c;
+        c.seed = 100 * endoscope_seed() + static_cast<std::uint64_t>(i);
+        c.endoscope = random_motion(rig, duration_s, random);
+        c.endoscope->profile = profile;
+        c.duration_s = endoscope_moves_s + duration_s / 2 + 0.5;
+        after.add(rig, c);
+      }
+      std::printf(
+          "%s %.1f s: held %.3f s after the beginning, %+.3f (latest %+.3f) after it is plain, in time %d of %d\n",
+          name, duration_s, after.held_s / after.runs, after.plain_s / after.runs, after.latest_plain_s, after.in_time,
+          after.runs);
+      EXPECT_LE(after.plain_s / after.runs, duration_s > 1 ? 0.6 : 0.1 + 1.0 / 60);
+    }
+}
+
+TEST(Run, HoldsAnEndoscopeThatMovesSmoothlyAsSoonAsThatIsPlain) {
   const Rig rig = testing::small_test_rig();
   Random random(1);
   for (const double duration_s : {1.0, 2.0}) {
@@ -524,23 +590,67 @@ TEST(Run, HoldsAnEndoscopeThatMovesSmoothlyWhenThatIsPlain) {
     c.endoscope = random_motion(rig, duration_s, random);
     c.endoscope->profile = MotionProfile::smooth;
     c.duration_s = endoscope_moves_s + duration_s / 2;
-    const PastRun done = run_case(c);
-    const ControllerConfig controller = config_of(rig, c).controller;
-    std::optional<double> plain_s, held_s;  // since it began to move; plain: the marker lies 0.5 mm beside
-    for (const Record& record : done.records) {
-      const double since_s = record.input.time_s - endoscope_moves_s;
-      const bool shown = since_s > c.latency_s - 0.01;
-      if (since_s > -1 && !shown) {
-        EXPECT_NE(record.decision.control.reason, HoldReason::endoscope_moved) << since_s;
-      }
-      if (since_s < 0) continue;
-      if (!plain_s && beside_m(rig, record.truth, record.camera_from_first_camera) > 5e-4) plain_s = since_s;
-      if (!held_s && shown && record.decision.control.action == ControlAction::hold) held_s = since_s;
-    }
-    ASSERT_TRUE(plain_s && held_s);
-    EXPECT_LE(*held_s - *plain_s, 0.1 + controller.period_s);
-    expect_within_limits(done, controller);
+    HeldAfter after;
+    after.add(rig, c);
+    EXPECT_EQ(after.in_time, 1);
   }
+}
+
+// Late and lost images, play, registrations that are 0.9 to 10 mm off, blur, smoke, blood: nothing moved.
+std::vector<std::pair<const char*, std::function<void(SimulatorConfig&)>>> resting() {
+  using Config = SimulatorConfig;
+  const std::vector<Blotch> blood{{0.5, 0.012, 0.002}, {2.5, 0.02, 0.0015}, {4.5, 0.03, 0.002}, {5.5, 0.008, 0.0015}};
+  return {{"as it is", [](Config&) {}},
+          {"jitter 4 ms", [](Config& c) { c.endoscope.jitter_s = 0.004; }},
+          {"jitter 8 ms", [](Config& c) { c.endoscope.jitter_s = 0.008; }},
+          {"a tenth lost", [](Config& c) { c.endoscope.dropped_fraction = 0.1; }},
+          {"play of rho, psi",
+           [](Config& c) {
+             c.arm.backlash = {0, 0, 8e-4, 0.03};
+           }},
+          {"play of all",
+           [](Config& c) {
+             c.arm.backlash = {1e-3, 1e-3, 8e-4, 0.03};
+           }},
+          {"RCM 0.9 mm off",
+           [](Config& c) {
+             c.arm.rcm_offset_m = {0.0005, -0.0005, 0.0005};
+           }},
+          {"RCM 1.7 mm off",
+           [](Config& c) {
+             c.arm.rcm_offset_m = {-0.001, 0.001, 0.001};
+           }},
+          {"RCM 5 mm off",
+           [](Config& c) {
+             c.arm.rcm_offset_m = {0.003, -0.003, 0.003};
+           }},
+          {"RCM 10 mm off",
+           [](Config& c) {
+             c.arm.rcm_offset_m = {-0.006, 0.006, 0.006};
+           }},
+          {"exposure 15 ms", [](Config& c) { c.endoscope.exposure_s = 0.015; }},
+          {"smoke", [](Config& c) { c.render.smoke = 0.35F; }},
+          {"blood", [blood](Config& c) { c.blotches = blood; }},
+          {"latency 0.2 s", [](Config& c) { c.endoscope.latency_s = 0.2; }}};
+}
+
+TEST(Run, DoesNotHoldAnEndoscopeThatRests) {
+  int ticks = 0, held = 0;
+  for (const auto& [name, change] : resting()) {
+    int held_here = 0;
+    for (int i = 0; i < endoscopes(); ++i) {
+      Case c;
+      c.change = change;
+      c.seed = 100 * endoscope_seed() + static_cast<std::uint64_t>(i);
+      c.duration_s = 5;
+      for (const Record& record : run_case(c).records)
+        ++ticks, held_here += record.decision.control.reason == HoldReason::endoscope_moved;
+    }
+    if (held_here > 0) std::printf("%s: held in %d ticks\n", name, held_here);
+    held += held_here;
+  }
+  std::printf("held in %d of %d ticks\n", held, ticks);
+  EXPECT_LE(held, 0.005 * ticks);
 }
 
 // From the fault until the start no joint moves, though the arm recovers in between.

@@ -9,6 +9,7 @@
 
 #include "lapservo/control/calibration_motion.h"
 #include "lapservo/core/angles.h"
+#include "lapservo/geometry/rotation.h"
 #include "lapservo/kinematics/centre_line.h"
 #include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/servo/image_features.h"
@@ -253,7 +254,7 @@ class MovedEndoscope {
 
   OperatingState state = OperatingState::enabled;
   Eigen::Vector4d encoder_off = Eigen::Vector4d::Zero(), seen_off = Eigen::Vector4d::Zero();
-  bool visible = true, tells_q = true, tells_marker = true, frozen = false, started = false, silent = false;
+  bool visible = true, passes_rcm = true, tells_marker = true, frozen = false, started = false, silent = false;
   int image_every = 1;
 
  private:
@@ -266,8 +267,10 @@ class MovedEndoscope {
     if (!visible) return image;
     const auto& believed = steps_ > 1 ? last_.camera_from_rcm : rig_.instruments[0].camera_from_rcm;
     const Marker& marker = rig_.instruments[0].marker;
-    const Rigid3 unrolled = camera_from_rcm_ * rcm_from_unrolled(JointVector::from_vector(q_shown_));
-    const auto edges_px = centre_line(rig_.camera, marker, unrolled, q_shown_[3]).value().ideal_px;
+    const Eigen::Vector4d q = q_shown_ + seen_off;
+    Rigid3 unrolled = camera_from_rcm_ * rcm_from_unrolled(JointVector::from_vector(q));
+    if (!passes_rcm) unrolled.rotation = rotation_by({0, 0, 0.15}) * unrolled.rotation;
+    const auto edges_px = centre_line(rig_.camera, marker, unrolled, q[3]).value().ideal_px;
     const auto rcm_px = believed ? projected_rcm_px(rig_.camera, *believed) : std::nullopt;
     const Features f = features_of(edges_px, rcm_px);
     image.found = believed.has_value();
@@ -275,8 +278,8 @@ class MovedEndoscope {
     image.covariance *= 1e-4;
     image.ends_px << edges_px[0], edges_px[3];
     const bool fits = believed && (believed->translation - camera_from_rcm_.translation).norm() < 1e-3;
-    if (fits && tells_q) image.q = q_shown_ + seen_off;
-    const Rigid3 pose = camera_from_marker(marker, unrolled, q_shown_[3]);
+    if (fits && passes_rcm) image.q = q;
+    const Rigid3 pose = camera_from_marker(marker, unrolled, q[3]);
     if (tells_marker) image.camera_from_marker = pose;
     return image;
   }
@@ -315,9 +318,9 @@ TEST(MovedEndoscope, IsMeasuredAnewAlsoWhenItMovesAgainBeforeAnImageAgreed) {
   MovedEndoscope world;
   world.move_until_measured();
   EXPECT_EQ(world.start_anew().registration, 2);
-  world.tells_q = false;
+  world.passes_rcm = false;
   EXPECT_EQ(world.steps(2).registration, 3);
-  world.tells_q = true;
+  world.passes_rcm = true;
   ASSERT_TRUE(world.until_measured());
   world.expect_started(4);
 }
@@ -362,14 +365,14 @@ TEST(MovedEndoscope, IsNotWhatHidesTheMarkerNowAndThen) {
   MovedEndoscope world;
   world.steps(60);
   for (int i = 0; i < 10; ++i) {
-    world.tells_q = false;
+    world.passes_rcm = false;
     world.step();
-    world.tells_q = true, world.visible = false;
+    world.passes_rcm = true, world.visible = false;
     world.step();
     world.visible = true;
   }
   EXPECT_EQ(world.steps(2).registration, 0);
-  world.tells_q = false;
+  world.passes_rcm = false;
   EXPECT_EQ(world.steps(2).registration, 1);
 }
 

@@ -93,11 +93,7 @@ class Fit {
  private:
   Six errors(std::size_t i, const ArmNumbers& x, const Eigen::Vector2d& shift) const {
     const MarkerSighting& seen = data_.sightings[i];
-    const Rigid3 expected = pose(seen, x, shift);
-    Six off;
-    off << expected.translation - seen.camera_from_marker.translation,
-        rotation_vector_of(expected.rotation * seen.camera_from_marker.rotation.conjugate());
-    return data_.whitening[i] * off;
+    return data_.whitening[i] * pose_difference(pose(seen, x, shift), seen.camera_from_marker);
   }
 
   Rigid3 pose(const MarkerSighting& seen, const ArmNumbers& x, const Eigen::Vector2d& shift) const {
@@ -122,6 +118,12 @@ class Fit {
 };
 
 }  // namespace
+
+Eigen::Matrix<double, 6, 1> pose_difference(const Rigid3& to, const Rigid3& from) {
+  Six difference;
+  difference << to.translation - from.translation, rotation_vector_of(to.rotation * from.rotation.conjugate());
+  return difference;
+}
 
 Rigid3 moved_by(const ArmNumbers& numbers, const Rigid3& camera_from_rcm) {
   return {(rotation_by(numbers.segment<3>(arm::rotation)) * camera_from_rcm.rotation).normalized(),

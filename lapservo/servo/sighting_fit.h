@@ -64,6 +64,9 @@ struct ArmFit {
 std::optional<ArmFit> fit_arm(const ArmData& data, const ArmHypothesis& hypothesis,
                               const ArmNumbers& start = ArmNumbers::Zero());
 
+/// From one pose to another: a translation, then a rotation vector, in the camera frame.
+Eigen::Matrix<double, 6, 1> pose_difference(const Rigid3& to, const Rigid3& from);
+
 /// camera_from_rcm with the numbers' rotation and translation.
 Rigid3 moved_by(const ArmNumbers& numbers, const Rigid3& camera_from_rcm);
 

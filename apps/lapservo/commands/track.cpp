@@ -31,6 +31,7 @@
 #include "lapservo/io/video/overlay_writer.h"
 #include "lapservo/io/video/video_encoder.h"
 #include "lapservo/rig/registration_covariance.h"
+#include "lapservo/rig/registration_text.h"
 #include "lapservo/robot/steady_clock.h"
 #include "lapservo/servo/registration_watch.h"
 #include "lapservo/vision/tracker.h"
@@ -164,9 +165,10 @@ struct Tally {
 
 void say_moved(const TrackOptions& options, const Frame& frame) {
   std::fprintf(stderr,
-               "lapservo: %s: the endoscope moved: from %d frames before frame %d (%.2f s) on shafts miss the RCM of "
-               "the rig, and q is empty or off; lapservo calibrate registration measures camera_from_rcm anew\n",
-               options.input.c_str(), RegistrationWatch::frames - 1, frame.index, frame.time_s);
+               "lapservo: %s: the endoscope moved: from %d frames before frame %d (%.2f s) on %s, and q is empty or "
+               "off: %s\n",
+               options.input.c_str(), RegistrationWatch::frames - 1, frame.index, frame.time_s, misses_rcm_text,
+               measure_registration_text);
 }
 
 [[noreturn]] void rethrow_with_frame(const InputError& error, const TrackOptions& options, const Frame& frame) {

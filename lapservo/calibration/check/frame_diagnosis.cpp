@@ -15,6 +15,7 @@
 #include "lapservo/calibration/recording/picture_light.h"
 #include "lapservo/calibration/registration/timed_pose.h"
 #include "lapservo/core/statistics.h"
+#include "lapservo/rig/registration_text.h"
 
 namespace lapservo::internal {
 namespace {
@@ -153,9 +154,8 @@ std::string FrameDiagnosis::text_of_missed_rcm() const {
     if (2 * static_cast<std::size_t>(seen.reversed) > seen.misses_m.size())
       return fmt::format("{}: in {} of {} frames {}", name, seen.reversed, seen.ok, reversed_marker);
     return fmt::format(
-        "{}: in {} of {} frames the shaft misses the rig's RCM, by {:.1f} mm (median): lapservo calibrate registration "
-        "measures camera_from_rcm{}",
-        name, seen.misses_m.size(), seen.ok, 1000 * median(std::vector(seen.misses_m)),
+        "{}: in {} of {} frames {}, by {:.1f} mm (median): {}{}", name, seen.misses_m.size(), seen.ok, misses_rcm_text,
+        1000 * median(std::vector(seen.misses_m)), measure_registration_text,
         rig_.camera.distorted()
             ? "; images that are already undistorted (image_rect) need a rig without distortion_coefficients"
             : "");
