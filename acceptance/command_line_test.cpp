@@ -20,6 +20,7 @@
 #include <opencv2/videoio.hpp>
 
 #include "acceptance/tool_test.h"
+#include "lapservo/core/angles.h"
 #include "lapservo/core/csv.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/sim/boards.h"
@@ -132,6 +133,24 @@ TEST_F(CommandLine, RenderThenTrack) {
     EXPECT_NEAR(observed.number(row, "l_px"), truth.number(row, "l_px"), 0.2);
     EXPECT_TRUE(fs::exists("out/overlay/" + truth.text(row, "file")));
   }
+}
+
+// With chroma of 4:2:0, psi is off by three times as much.
+TEST_F(CommandLine, AVideoThatItRenderedIsMeasuredWell) {
+  expect_done("render --rig configs/example.yaml --out out/film --count 40 --moving --video --seed 5");
+  expect_done("track out/film/video.mp4 --rig out/film/rig.yaml --out out/film.csv");
+  const CsvTable observed = CsvTable::read("out/film.csv"), truth = CsvTable::read("out/film/truth.csv");
+  double squares = 0, normed = 0;
+  int found = 0;
+  for (std::size_t i = 0; i < observed.rows(); ++i) {
+    if (observed.text(i, "status") != "ok") continue;
+    const double off = wrap_pi(observed.number(i, "psi_rad") - truth.number(i, "psi_rad"));
+    ++found, squares += off * off, normed += std::pow(off / observed.number(i, "sigma_psi_rad"), 2);
+  }
+  EXPECT_GE(found, 39);
+  EXPECT_LE(std::sqrt(squares / found), 5e-3);
+  EXPECT_GE(std::sqrt(normed / found), 0.7);
+  EXPECT_LE(std::sqrt(normed / found), 1.4);
 }
 
 TEST_F(CommandLine, TrackNamesTheRigThatItFound) {

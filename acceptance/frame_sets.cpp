@@ -199,7 +199,7 @@ void compress(std::vector<TrueFrame>& frames, Encoder encoder) {
   const testing::TemporaryFolder folder;
   const auto path = folder.path() / "frames.mp4";
   if (encoder == Encoder::lapservo) {
-    VideoEncoder writer(path, "frames.mp4", frames.at(0).bgr.size(), 30);
+    VideoEncoder writer(path, "frames.mp4", frames.at(0).bgr.size(), 30, VideoUse::shown);
     for (const TrueFrame& frame : frames) writer.add(frame.bgr);
     writer.finish();
   } else if (encoder == Encoder::ffmpeg) {

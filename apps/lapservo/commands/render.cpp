@@ -142,7 +142,7 @@ int run(const RenderArguments& options) {
   Renderer renderer = make_renderer(rig, options);
   TruthCsv truth(folder / "truth.csv");
   std::optional<VideoWriter> video;
-  if (options.video) video.emplace(folder / "video.mp4", options.fps);
+  if (options.video) video.emplace(folder / "video.mp4", options.fps, VideoUse::measured);
   watch_for_interrupts();
   {
     Progress progress(static_cast<int>(frames.size()));

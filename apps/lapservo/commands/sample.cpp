@@ -152,7 +152,7 @@ class Sample {
   }
 
   void film() {
-    VideoWriter video(folder_ / "video.mp4", video_fps);
+    VideoWriter video(folder_ / "video.mp4", video_fps, VideoUse::measured);
     show_motion(video_frames, video_fps, swinging, [&](int, const cv::Mat& image) { video.add(image); });
     video.commit();
   }
@@ -190,7 +190,7 @@ void add_sample(Command app, Run& run_later) {
       "boards/      a chessboard of 9x6 inner corners and squares of 5 mm\n"
       "turn/        the instrument rotated about its axis, 8 images a second; turn_joints.csv has its joints\n"
       "swing/       the instrument swung in all four joints, the same; swing_joints.csv has its joints\n"
-      "video.mp4    the swing as a camera films it: H.264, 30 images a second\n"
+      "video.mp4    the swing as a camera films it: H.264 4:4:4, 30 images a second\n"
       "truth.yaml   the rig that calibration should find\n"
       "joint_limits.yaml  limits of the simulated arm's joints, for servo --joint-limits\n"
       "Example:\n  lapservo sample morning");

@@ -18,7 +18,7 @@ namespace {
 constexpr int ticks_per_second =
     60'000;  // whole periods of 24, 25, 30, 50 and 60 frames a second; MPEG-4's largest: 65535
 
-constexpr const char *preset = "ultrafast", *crf = "22";
+constexpr const char *preset = "ultrafast", *crf_shown = "22", *crf_measured = "14";
 
 // Not containers of several files, as playlists are. Those that list no codecs (MPEG-TS) take it, unless they are
 // nothing but bytes.
@@ -34,10 +34,10 @@ const AVCodec* encoder_for(const AVOutputFormat* container) {
   return takes(container, h264) ? h264 : takes(container, mpeg4) ? mpeg4 : nullptr;
 }
 
-void set_quality(AVCodecContext& codec) {
+void set_quality(AVCodecContext& codec, VideoUse use) {
   if (codec.codec_id == AV_CODEC_ID_H264) {
     av_opt_set(codec.priv_data, "preset", preset, 0);
-    av_opt_set(codec.priv_data, "crf", crf, 0);
+    av_opt_set(codec.priv_data, "crf", use == VideoUse::measured ? crf_measured : crf_shown, 0);
   } else {
     constexpr int fine = 2;  // of 1 to 31
     codec.flags |= AV_CODEC_FLAG_QSCALE;
@@ -69,14 +69,14 @@ void VideoEncoder::FreedFile::operator()(AVFormatContext* file) const {
 }
 
 VideoEncoder::VideoEncoder(const std::filesystem::path& path, const std::string& shown, const cv::Size& size,
-                           double frames_per_second)
+                           double frames_per_second, VideoUse use)
     : shown_(shown) {
   av_log_set_level(AV_LOG_QUIET);
   AVFormatContext* file = nullptr;
   avformat_alloc_output_context2(&file, av_guess_format(nullptr, shown.c_str(), nullptr), nullptr, path.c_str());
   if (!file) refuse();
   file_.reset(file);
-  open_codec(size, frames_per_second);
+  open_codec(size, frames_per_second, use);
   open_file(path);
 }
 
@@ -89,15 +89,15 @@ void VideoEncoder::need(int result) const {
     throw InputError(shown_, "could not be written to its end (is the disk full?)");
 }
 
-void VideoEncoder::open_codec(const cv::Size& size, double frames_per_second) {
+void VideoEncoder::open_codec(const cv::Size& size, double frames_per_second, VideoUse use) {
   constexpr int finest = 1'001'000;  // 30000/1001 is one of its fractions
   const AVCodec* encoder = encoder_for(file_->oformat);
   codec_.reset(encoder ? avcodec_alloc_context3(encoder) : nullptr);
   if (!codec_) refuse();
-  const bool even = size.width % 2 == 0 && size.height % 2 == 0;
+  const bool subsampled = use == VideoUse::shown && size.width % 2 == 0 && size.height % 2 == 0;
   codec_->width = size.width;
   codec_->height = size.height;
-  codec_->pix_fmt = even || encoder->id != AV_CODEC_ID_H264 ? AV_PIX_FMT_YUV420P : AV_PIX_FMT_YUV444P;
+  codec_->pix_fmt = subsampled || encoder->id != AV_CODEC_ID_H264 ? AV_PIX_FMT_YUV420P : AV_PIX_FMT_YUV444P;
   codec_->framerate = av_d2q(frames_per_second, finest);
   codec_->time_base = av_inv_q(codec_->framerate);
   if (!constant_rate()) {
@@ -107,7 +107,7 @@ void VideoEncoder::open_codec(const cv::Size& size, double frames_per_second) {
   codec_->gop_size = std::max(1, static_cast<int>(std::lround(frames_per_second)));  // a second, to be stepped to
   codec_->max_b_frames = 0;  // so that times are in order in containers that know no other
   if (file_->oformat->flags & AVFMT_GLOBALHEADER) codec_->flags |= AV_CODEC_FLAG_GLOBAL_HEADER;
-  set_quality(*codec_);
+  set_quality(*codec_, use);
   set_colours(*codec_);
   if (avcodec_open2(codec_.get(), encoder, nullptr) < 0) refuse();
 }

@@ -14,15 +14,19 @@ namespace lapservo::internal {
 /// A remark on videos when this FFmpeg has no libx264: that they are MPEG-4 part 2; else empty.
 std::string video_remark();
 
-/// A video file while it is written, by FFmpeg's libraries: H.264 (libx264) that browsers play, in Rec. 601's limited
-/// range and with chroma's samples amid four pixels, which the file says, as VideoReader reads it back. Images of an
-/// odd width or height, which 4:2:0 can't hold, are 4:4:4, which not every browser plays. Without libx264 it is MPEG-4
+enum class VideoUse {
+  shown,     ///< 4:2:0, which browsers play; 4:4:4 where the width or height is odd
+  measured,  ///< 4:4:4 at a finer quality, ten times the size: colour boundaries stay where they are
+};
+
+/// A video file while it is written, by FFmpeg's libraries: H.264 (libx264) in Rec. 601's limited range, with 4:2:0
+/// chroma's samples amid four pixels, which the file says, as VideoReader reads it back. Without libx264 it is MPEG-4
 /// part 2.
 class VideoEncoder {
  public:
   /// The container goes by the ending of `shown`. Throws InputError naming it when there is none for it.
   VideoEncoder(const std::filesystem::path& path, const std::string& shown, const cv::Size& size,
-               double frames_per_second);
+               double frames_per_second, VideoUse use);
 
   cv::Size size() const { return {codec_->width, codec_->height}; }
   /// 8-bit BGR of that size, shown `time_s` seconds after the video's start; without a time, or with one that is not
@@ -38,7 +42,7 @@ class VideoEncoder {
   };
 
   bool constant_rate() const;
-  void open_codec(const cv::Size& size, double frames_per_second);
+  void open_codec(const cv::Size& size, double frames_per_second, VideoUse use);
   void open_file(const std::filesystem::path& path);
   void convert(const cv::Mat& bgr);
   void write_packets();

@@ -24,8 +24,8 @@ int frames_in(const fs::path& path) {
 
 }  // namespace
 
-VideoWriter::VideoWriter(const fs::path& path, double frames_per_second)
-    : target_(path), frames_per_second_(frames_per_second) {
+VideoWriter::VideoWriter(const fs::path& path, double frames_per_second, VideoUse use)
+    : target_(path), frames_per_second_(frames_per_second), use_(use) {
   if (target_.is_stream())
     throw InputError(path.string(), "is no regular file, expected a video to write, like overlay.mp4");
   temporary_.emplace(target_);
@@ -33,7 +33,8 @@ VideoWriter::VideoWriter(const fs::path& path, double frames_per_second)
 
 void VideoWriter::add(const cv::Mat& frame, std::optional<double> time_s) {
   const std::string name = target_.name.string();
-  if (!encoder_) encoder_ = std::make_unique<VideoEncoder>(temporary_->path(), name, frame.size(), frames_per_second_);
+  if (!encoder_)
+    encoder_ = std::make_unique<VideoEncoder>(temporary_->path(), name, frame.size(), frames_per_second_, use_);
   if (frame.type() != CV_8UC3 || frame.size() != encoder_->size())
     throw InputError(name, "can't take a frame of another size or kind than the first");
   ++frames_;

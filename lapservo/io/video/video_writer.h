@@ -16,7 +16,7 @@ namespace lapservo::internal {
 class VideoWriter {
  public:
   /// Throws InputError at once when it can't be written.
-  VideoWriter(const std::filesystem::path& path, double frames_per_second);
+  VideoWriter(const std::filesystem::path& path, double frames_per_second, VideoUse use = VideoUse::shown);
 
   /// 8-bit BGR, all of one size, at VideoEncoder::add()'s times. Throws InputError when there is no encoder for the
   /// name's ending; commit() reports a full disk.
@@ -28,6 +28,7 @@ class VideoWriter {
   OutputTarget target_;
   std::optional<TemporaryFile> temporary_;
   double frames_per_second_;
+  VideoUse use_;
   std::unique_ptr<VideoEncoder> encoder_;  // goes before its file
   int frames_ = 0;
   bool failed_ = false;
