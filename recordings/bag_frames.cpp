@@ -9,7 +9,6 @@
 
 #include "lapservo/core/error.h"
 #include "lapservo/crtk/image_decoder.h"
-#include "lapservo/io/image_file.h"
 #include "recordings/bag_topics.h"
 
 namespace lapservo::internal {
@@ -46,9 +45,7 @@ std::optional<BagFrames::Picture> BagFrames::read() {
 std::optional<Frame> BagFrames::next() {
   auto picture = index_ == 0 ? std::optional(Picture{first_->time_s, std::exchange(first_->bgr, {})}) : read();
   if (!picture) return std::nullopt;
-  Frame frame{std::move(picture->bgr), index_++, picture->time_s - first_->time_s, {}, {}};
-  if (has_few_colours(frame.bgr)) frame.flaw = Status::few_colours;
-  return frame;
+  return Frame{std::move(picture->bgr), index_++, picture->time_s - first_->time_s, {}, {}};
 }
 
 std::optional<int> BagFrames::frame_count() const {

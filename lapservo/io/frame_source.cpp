@@ -99,11 +99,7 @@ class VideoSource : public FrameSource {
     auto image = first_ ? std::exchange(first_, std::nullopt) : video_.next();
     if (!image) return std::nullopt;
     Frame frame{std::move(image->bgr), index_++, image->time_s, {}, {}};
-    if (image->damaged) {
-      frame.flaw = Status::damaged;
-    } else if (has_few_colours(frame.bgr)) {
-      frame.flaw = Status::few_colours;
-    }
+    if (image->damaged) frame.flaw = Status::damaged;
     return frame;
   }
   Kind kind() const override { return Kind::video; }

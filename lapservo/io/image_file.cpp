@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <cstring>
 #include <string_view>
-#include <vector>
 
 #include <opencv2/imgproc.hpp>
 
@@ -184,23 +183,6 @@ cv::Mat bgr8_from(const cv::Mat& image, const std::string& source) {
   }
 }
 
-bool has_few_colours(const cv::Mat& bgr) {
-  constexpr int palette = 256;
-  std::vector<bool> seen(std::size_t{1} << 24);
-  int colours = 0;
-  bool any_colour = false;
-  for (int v = 0; v < bgr.rows; ++v)
-    for (int u = 0; u < bgr.cols; ++u) {
-      const auto& p = bgr.at<cv::Vec3b>(v, u);
-      const std::size_t colour = std::size_t{p[0]} | std::size_t{p[1]} << 8 | std::size_t{p[2]} << 16;
-      if (seen[colour]) continue;
-      seen[colour] = true;
-      any_colour = any_colour || p[0] != p[1] || p[1] != p[2];
-      if (++colours > palette) return false;
-    }
-  return any_colour;
-}
-
 Picture decode_picture(std::span<const std::uint8_t> bytes, const std::string& source) {
   if (bytes.empty()) throw InputError(source, "is empty, expected an image");
   check_whole(bytes, source);
@@ -221,17 +203,13 @@ Picture decode_picture(std::span<const std::uint8_t> bytes, const std::string& s
   const bool is_deep = is_png(bytes) ? bytes[png_depth] == 16 : decoded.bgr.depth() == CV_16U;
   constexpr double most_of_12_bits = 16;  // of 255
   picture.low_bits = is_deep && cv::norm(picture.bgr, cv::NORM_INF) <= most_of_12_bits;
-  if (!decoded.complaint.empty()) {
-    picture.flaw = Status::damaged;
-  } else if (has_few_colours(picture.bgr)) {
-    picture.flaw = Status::few_colours;
-  }
+  if (!decoded.complaint.empty()) picture.flaw = Status::damaged;
   return picture;
 }
 
 cv::Mat decode_image(std::span<const std::uint8_t> bytes, const std::string& source) {
   const Picture picture = decode_picture(bytes, source);
-  if (picture.flaw == Status::damaged) throw InputError(source, "is damaged, expected a whole image");
+  if (picture.flaw) throw InputError(source, "is damaged, expected a whole image");
   return picture.bgr;
 }
 

@@ -24,8 +24,7 @@ bool is_written(const std::filesystem::path& path);
 /// Whether the name ends like that of an image in HEIC, AVIF or DICOM, which are not read.
 bool has_unread_extension(const std::filesystem::path& path);
 
-/// An image in 8-bit BGR, and why nothing is to be measured in it: `damaged` when its decoder complained, `few_colours`
-/// when it has no more colours than a palette.
+/// An image in 8-bit BGR, and why nothing is to be measured in it: `damaged` when its decoder complained.
 struct Picture {
   cv::Mat bgr;
   std::optional<Status> flaw;
@@ -43,10 +42,6 @@ Picture decode_picture(std::span<const std::uint8_t> bytes, const std::string& s
 /// The same of images whose decoder does not complain: else InputError.
 cv::Mat read_image(const std::filesystem::path& path);
 cv::Mat decode_image(std::span<const std::uint8_t> bytes, const std::string& source);
-
-/// Whether an 8-bit BGR image has colours, but no more than a palette (256): each then stands for many, and the edges
-/// between them are not where the light's were.
-bool has_few_colours(const cv::Mat& bgr);
 
 /// 8-bit BGR of any supported pixel type, as above.
 cv::Mat bgr8_from(const cv::Mat& image, const std::string& source);

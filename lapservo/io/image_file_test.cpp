@@ -151,18 +151,6 @@ TEST(Image, AnyChangedBitOfAPngIsNoticed) {
   }
 }
 
-TEST(Image, OfNoMoreColoursThanAPaletteIsFlagged) {
-  cv::Mat few = shades();
-  for (int v = 0; v < few.rows; ++v)
-    for (int u = 0; u < few.cols; ++u)
-      for (int c = 0; c < 3; ++c) few.at<cv::Vec3b>(v, u)[c] &= 0xc0;
-  EXPECT_TRUE(has_few_colours(few));
-  EXPECT_EQ(decode_picture(encoded(few, ".png"), "p").flaw, Status::few_colours);
-  EXPECT_FALSE(has_few_colours(shades()));
-  const cv::Mat grey(20, 20, CV_8UC3, cv::Scalar::all(90));
-  EXPECT_FALSE(has_few_colours(grey)) << "without colours there is no marker to be wrong about";
-}
-
 TEST(Image, IsRefusedWhereverTheFileIsCut) {
   Random random(seed);
   const cv::Mat image = random_image<std::uint8_t>(12, 12, CV_8UC3, random);

@@ -15,7 +15,6 @@ enum class Status {
   uncertain,        ///< found, but the rotation's standard deviation is too large to be of use
   marker_mismatch,  ///< the print is not as the rig says: calibrate the marker
   damaged,          ///< the decoder of the picture or video complained: its pixels are not the camera's
-  few_colours,      ///< the picture has no more colours than a palette: its pixels are not the camera's
   interlaced,       ///< the frame is made of two fields, of two moments: use --deinterlace
 };
 std::string_view to_string(Status status);

@@ -13,8 +13,6 @@ class Status(Enum):
     uncertain = "uncertain"
     marker_mismatch = "marker_mismatch"
     damaged = "damaged"
-    few_colours = "few_colours"
-    few_colors = "few_colours"  # an earlier name of few_colours
     interlaced = "interlaced"
 
 
@@ -28,7 +26,6 @@ _MEANINGS = {
     "uncertain": "found, but the rotation's standard deviation is too large to be of use",
     "marker_mismatch": "the print is not as the rig says: calibrate the marker",
     "damaged": "the decoder of the image or video complained: its pixels are not the camera's",
-    "few_colours": "the image has no more colours than a palette: its pixels are not the camera's",
     "interlaced": "the frame is made of two fields, of two moments: use deinterlace",
 }
 for _status in Status:

@@ -78,7 +78,7 @@ void BoardRecordings::look_at(FrameSource& source, const std::string& name, cons
     check_frame_size(*frame, name, *size_, whose_);
     if (read++ % every != 0) continue;
     if (frame->flaw) {
-      read_.flawed.add(*frame->flaw, frame->bgr);
+      ++read_.damaged;
       continue;
     }
     ++read_.looked_at;
@@ -106,12 +106,12 @@ CameraMeasurement measure_camera(const Board& board, BoardRecordings recordings,
   measured.views = recordings.take_views();
   if (measured.views.empty()) {
     measured.calibration.refusal =
-        read.all_flawed()
-            ? read.flawed.text(read.flawed.all())
+        read.all_damaged()
+            ? text_of_damaged(read.damaged, read.damaged)
             : fmt::format(
                   "the board is in none of {} images{}: look at the board's number of inner corners, show it wholly, "
                   "sharp, with a white margin",
-                  read.looked_at, read.damaged());
+                  read.looked_at, read.remark_on_damaged());
     return measured;
   }
   int step = 0;

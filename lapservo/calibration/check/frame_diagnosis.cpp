@@ -12,6 +12,7 @@
 #include "lapservo/calibration/check/other_bands.h"
 #include "lapservo/calibration/check/other_readings.h"
 #include "lapservo/calibration/check/usual_cause.h"
+#include "lapservo/calibration/recording/frame_recording.h"
 #include "lapservo/calibration/recording/picture_light.h"
 #include "lapservo/calibration/registration/timed_pose.h"
 #include "lapservo/core/statistics.h"
@@ -43,11 +44,10 @@ bool is_grey(const cv::Mat& bgr) {
   return share_below(largest - smallest, grey_range) >= pixel_share;
 }
 
-// The flaw of a frame that the tracker refused.
-std::optional<Status> flaw_in(const std::vector<Observation>& observations) {
-  for (const Observation& observation : observations)
-    if (observation.status == Status::damaged || observation.status == Status::few_colours) return observation.status;
-  return std::nullopt;
+// Whether the tracker refused the frame.
+bool is_damaged(const std::vector<Observation>& observations) {
+  return std::any_of(observations.begin(), observations.end(),
+                     [](const Observation& observation) { return observation.status == Status::damaged; });
 }
 
 }  // namespace
@@ -56,10 +56,10 @@ FrameDiagnosis::FrameDiagnosis(const Rig& rig, bool deinterlaced) : rig_(rig), d
 
 void FrameDiagnosis::add(const cv::Mat& bgr, const std::vector<Observation>& observations) {
   ++frames_;
-  if (const auto flaw = flaw_in(observations)) {
+  if (is_damaged(observations)) {
     for (const Observation& observation : observations) ++seen_[observation.instrument].refused[observation.status];
     ++without_instrument_;
-    flawed_.add(*flaw, bgr);
+    ++damaged_;
     return;
   }
   bool any_ok = false, any_result = false, interlaced = false;
@@ -126,7 +126,7 @@ std::string FrameDiagnosis::cause() const {
 }
 
 std::string FrameDiagnosis::cause_in_frames(bool found_nowhere) const {
-  if (2 * flawed_.all() > frames_) return flawed_.text(frames_);
+  if (2 * damaged_ > frames_) return text_of_damaged(damaged_, frames_);
   if (kept_.empty()) return "";
   if (!deinterlaced_ && 2 * interlaced_ > frames_)
     return fmt::format("{} of {} frames are interlaced: --deinterlace tracks one field of each", interlaced_, frames_);

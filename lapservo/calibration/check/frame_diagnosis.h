@@ -7,13 +7,12 @@
 
 #include <opencv2/core.hpp>
 
-#include "lapservo/calibration/recording/frame_recording.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/vision/observation.h"
 
 namespace lapservo::internal {
 
-/// Why frames of a recording are flawed, show no instrument of a rig, or an instrument that misses the rig's RCM.
+/// Why frames of a recording are damaged, show no instrument of a rig, or an instrument that misses the rig's RCM.
 /// Frames are added as they are tracked; a few of those without a result are kept and tried again in other readings
 /// (other_readings.h) when text() or cause() is called.
 class FrameDiagnosis {
@@ -52,8 +51,7 @@ class FrameDiagnosis {
 
   Rig rig_;
   bool deinterlaced_;
-  int frames_ = 0, without_instrument_ = 0, interlaced_ = 0;
-  FlawedFrames flawed_;
+  int frames_ = 0, without_instrument_ = 0, interlaced_ = 0, damaged_ = 0;
   std::map<std::string, Seen> seen_;
   std::vector<cv::Mat> kept_;
   int without_result_ = 0;  ///< frames, some of which may show an instrument that misses the rig's RCM

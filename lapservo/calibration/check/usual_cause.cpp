@@ -27,8 +27,6 @@ const char* usual_cause(Status status) {
       return "the print is not as the rig says; lapservo calibrate marker measures it from a slow turn";
     case Status::damaged:
       return "the decoder reports damaged frames; repair what carries them, or record them again";
-    case Status::few_colours:
-      return "the frames have no more colours than a palette; record them in true colour, not indexed";
     case Status::interlaced:
       return "the frames are interlaced; --deinterlace tracks one field of each";
   }

@@ -41,7 +41,7 @@ MarkerMeasurement measure_marker(const Rig& rig, std::size_t index, const FrameR
   if (measured.found == 0) {
     measured.calibration.refusal =
         fmt::format("{} is in none of {} frames{}: look at the rig's hues_deg and diameter_m{}", instrument.name,
-                    measured.read.looked_at, measured.read.damaged(), diagnosis.cause());
+                    measured.read.looked_at, measured.read.remark_on_damaged(), diagnosis.cause());
     return measured;
   }
   const auto progress = [&](int round, int most) {

@@ -4,28 +4,18 @@
 
 #include <fmt/format.h>
 
-#include "lapservo/calibration/recording/picture_light.h"
 #include "lapservo/core/error.h"
 #include "lapservo/io/image_file.h"
 #include "lapservo/vision/image/interlacing.h"
 
 namespace lapservo::internal {
 
-void FlawedFrames::add(Status flaw, const cv::Mat& bgr) {
-  ++(flaw == Status::few_colours ? few_colours : damaged);
-  dark += flaw == Status::few_colours && light_of_picture(bgr).dark() ? 1 : 0;
+std::string text_of_damaged(int damaged, int frames) {
+  return fmt::format("{} of {} frames are damaged: repair what carries them, or record them again", damaged, frames);
 }
 
-std::string FlawedFrames::text(int frames) const {
-  if (damaged >= few_colours)
-    return fmt::format("{} of {} frames are damaged: repair what carries them, or record them again", damaged, frames);
-  if (2 * dark > few_colours) return dark_pictures;
-  return fmt::format("{} of {} frames have no more colours than a palette: record them in true colour, not indexed",
-                     few_colours, frames);
-}
-
-std::string FramesRead::damaged() const {
-  return flawed.all() > 0 ? fmt::format(" ({} are damaged)", flawed.all()) : "";
+std::string FramesRead::remark_on_damaged() const {
+  return damaged > 0 ? fmt::format(" ({} are damaged)", damaged) : "";
 }
 
 void check_frame_size(const Frame& frame, const std::string& recording, const cv::Size& expected,
@@ -49,7 +39,7 @@ FramesRead read_frames(const FrameRecording& recording, const Rig& rig, int ever
     check_frame_size(*frame, recording.name, {rig.camera.width_px, rig.camera.height_px}, "the rig's camera");
     if (read++ % every != 0) continue;
     if (frame->flaw) {
-      frames.flawed.add(*frame->flaw, frame->bgr);
+      ++frames.damaged;
       continue;
     }
     ++frames.looked_at;
@@ -57,7 +47,7 @@ FramesRead read_frames(const FrameRecording& recording, const Rig& rig, int ever
     watch.tell(source.frame_count(), read,
                look(deinterlace ? field.of(frame->bgr).clone() : frame->bgr, frame->time_s));
   }
-  if (frames.all_flawed()) throw InputError(recording.name, frames.flawed.text(frames.flawed.all()));
+  if (frames.all_damaged()) throw InputError(recording.name, text_of_damaged(frames.damaged, frames.damaged));
   frames.lossy = source.is_lossy() || frames.jpegs > 0;
   frames.complaint = source.complaint();
   return frames;

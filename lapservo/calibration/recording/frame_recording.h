@@ -30,29 +30,21 @@ struct JobWatch {
   }
 };
 
-/// Frames in which nothing is to be measured: see Frame::flaw.
-struct FlawedFrames {
-  int damaged = 0, few_colours = 0;
-  int dark = 0;  ///< of few_colours: such a frame shows nothing that has colours
-
-  void add(Status flaw, const cv::Mat& bgr);
-  int all() const { return damaged + few_colours; }
-  /// How many of so many frames they are, the cause and its remedy; of the more frequent flaw.
-  std::string text(int frames) const;
-};
+/// How many of so many frames are damaged, and the remedy.
+std::string text_of_damaged(int damaged, int frames);
 
 /// Counts of a recording's frames.
 struct FramesRead {
   int looked_at = 0;
-  FlawedFrames flawed;
+  int damaged = 0;        ///< see Frame::flaw
   int jpegs = 0;          ///< of those looked at: what compressed them saw no frame before
   bool stopped = false;   ///< by the user
   bool lossy = false;     ///< FrameSource::is_lossy(), or JPEG
   std::string complaint;  ///< what could not be read; empty when all was
 
-  bool all_flawed() const { return flawed.all() > 0 && looked_at == 0; }
+  bool all_damaged() const { return damaged > 0 && looked_at == 0; }
   /// " (3 are damaged)", or nothing.
-  std::string damaged() const;
+  std::string remark_on_damaged() const;
 };
 
 /// Throws InputError, naming the frame's file or else `recording`, at a frame of another size than `whose`.
@@ -60,7 +52,7 @@ void check_frame_size(const Frame& frame, const std::string& recording, const cv
                       const std::string& whose);
 
 /// Shows every `every`-th frame to `look`, as the tracker would see it, with its time; `look` may keep it, and returns
-/// a remark beside the progress. Throws InputError at a frame that is not of the rig's size, and where all are flawed.
+/// a remark beside the progress. Throws InputError at a frame that is not of the rig's size, and where all are damaged.
 FramesRead read_frames(const FrameRecording& recording, const Rig& rig, int every, const JobWatch& watch,
                        const std::function<std::string(const cv::Mat&, double)>& look);
 

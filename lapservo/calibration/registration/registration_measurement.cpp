@@ -65,8 +65,8 @@ MeasuredPoses poses_in_frames(const Rig& rig, std::size_t instrument, const Fram
                              return fmt::format(", {} in {}", name, poses.all.size());
                            });
   if (poses.all.empty())
-    poses.none = fmt::format("{} is in none of {} frames{}{}", name, poses.read.looked_at, poses.read.damaged(),
-                             diagnosis.cause());
+    poses.none = fmt::format("{} is in none of {} frames{}{}", name, poses.read.looked_at,
+                             poses.read.remark_on_damaged(), diagnosis.cause());
   return poses;
 }
 
