@@ -20,12 +20,12 @@ struct DecodedPicture {
 DecodedPicture decode_jpeg(std::span<const std::uint8_t> bytes);
 
 struct CheckedJpeg {
-  std::string complaint;            ///< the decoder's; or a defect that no camera makes; empty: none
+  std::string complaint;            ///< the decoder's; empty: none
   std::vector<std::uint8_t> clean;  ///< where bytes belong to no block: the JPEG without them (jpeg_strays.h)
 };
 
-/// Reads the coefficients only, in a third of the time. Looks for colours that are shifted from some block on
-/// (jpeg_dc_shift.h). Bytes that belong to no block and a missing end marker are no complaint: they cost no pixel.
+/// Reads the coefficients only, in a third of the time. Bytes that belong to no block and a missing end marker are no
+/// complaint: they cost no pixel.
 CheckedJpeg check_jpeg(std::span<const std::uint8_t> bytes);
 
 }  // namespace lapservo::internal
