@@ -1,7 +1,6 @@
 // accuracy_study STUDY [FRAMES [SEED [ROW...]]]: accuracy and normalised errors of the tracker, a row for each
 // condition of the study (camera, samples, blood or motion: accuracy_study.h), all of them without ROW. Tables of
-// docs/notes/accuracy.md. The study "edges" is of single boundaries and sides (docs/notes/edges.md),
-// "hostile" counts false accepts.
+// docs/notes/accuracy.md. The study "edges" is of single boundaries and sides, "hostile" counts false accepts.
 #include "bench/accuracy_study.h"
 
 #include <algorithm>

@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 """check_words.py: removed words (docs/glossary.md has the terms to use instead) in the pages for users and in comments, docstrings and
-messages of the sources. Not read: docs/notes (records of their day), code in pages, names in backticks, targets of links, and
-lapservo/vision."""
+messages of the sources. Not read: code in pages, names in backticks, targets of links, and lapservo/vision."""
 import io
 import re
 import subprocess
@@ -59,7 +58,7 @@ def main() -> int:
     hits = []
     for name in files:
         path = Path(name)
-        if path.suffix == ".md" and (len(path.parts) == 1 or path.parent == Path("docs")):
+        if path.suffix == ".md" and (len(path.parts) == 1 or path.parts[0] == "docs"):
             prose = prose_of_page(path.read_text())
         elif path.suffix in {".cpp", ".h", ".js"} and path.parts[:2] != ("lapservo", "vision"):
             prose = comments_of_c(path.read_text())

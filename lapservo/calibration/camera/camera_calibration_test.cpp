@@ -87,7 +87,7 @@ void expect_found(const Camera& camera, const CameraCalibration& found) {
   EXPECT_NEAR(found.camera.chromatic_aberration.red, camera.chromatic_aberration.red, 5e-5);
 }
 
-// LAPSERVO_BOARD_CAMERAS cameras, from LAPSERVO_BOARD_SEED on, for docs/notes/calibration.md.
+// LAPSERVO_BOARD_CAMERAS cameras, from LAPSERVO_BOARD_SEED on.
 TEST(CalibrateCamera, FindsLensAberrationAndResponse) {
   const int cameras = testing::from_environment("LAPSERVO_BOARD_CAMERAS", 1),
             first = testing::from_environment("LAPSERVO_BOARD_SEED", 40);
@@ -196,7 +196,7 @@ const std::vector<std::pair<std::string, Response>> responses{{"srgb", {}},
                                                               {"contrast 6", contrasty(6)}};
 
 // Evenly lit, the edges leave a curve's contrast open. LAPSERVO_BOARD_RESPONSES=1, with LAPSERVO_BOARD_SEED: all of
-// docs/notes/calibration.md.
+// them.
 TEST(CalibrateCamera, TakesAUsualResponseUnlessEdgesSpeakAgainstIt) {
   if (testing::from_environment("LAPSERVO_BOARD_RESPONSES", 0) == 0) {
     for (const auto& [blur_px, i] : {std::pair{1.6, 0U}, {0.8, 2U}, {1.2, 4U}})

@@ -52,7 +52,7 @@ std::optional<FrameFit> fit_frames(const FrameResiduals& residuals, const std::v
                                    std::size_t held = 0);
 
 /// Times sigma: what goes with the pose (the side of the marker that is seen, a codec's habits) is neither noise nor
-/// common to all frames, and in no covariance. On rendered motions it doubles the errors (docs/notes/calibration.md).
+/// common to all frames, and in no covariance. On rendered motions it doubles the errors (docs/notes/decisions.md).
 inline constexpr double unmodelled_sigmas = 2;
 
 }  // namespace lapservo::internal

@@ -74,7 +74,7 @@ libav::Scaler scaler_of(const cv::Size& size, AVPixelFormat format, const Place&
   set("dstw", size.width), set("dsth", size.height);
   set("dst_format", to);
   // Without SWS_ACCURATE_RND chroma is repeated. SWS_BICUBIC overshoots where an encoder's filter does already
-  // (docs/notes/cameras.md).
+  // (docs/notes/decisions.md).
   set("sws_flags", SWS_BILINEAR | SWS_ACCURATE_RND | SWS_FULL_CHR_H_INT | SWS_FULL_CHR_H_INP);
   set("src_h_chr_pos", chroma.column), set("src_v_chr_pos", chroma.row);
   return sws_init_context(scaler.get(), nullptr, nullptr) < 0 ? nullptr : std::move(scaler);
