@@ -144,7 +144,7 @@ std::vector<Sample> samples(const Rig& rig, const fs::path& folder) {
     psi_rad.push_back(q.psi_rad);
   }
   std::vector<Sample> all;
-  for (const char* extension : {".png", ".jpg", ".bmp", ".tif", ".webp", ".ppm"}) {
+  for (const char* extension : {".png", ".jpg", ".bmp", ".webp", ".ppm"}) {
     std::vector<std::uint8_t> bytes;
     cv::imencode(extension, frames[0], bytes);
     all.push_back({extension, {bytes.begin(), bytes.end()}, {psi_rad[0]}});

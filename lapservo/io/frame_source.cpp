@@ -42,7 +42,7 @@ std::string remark_on(const Pictures& pictures, const std::vector<fs::path>& fil
   if (transfer) remarks.push_back(remark_on_transfer(*transfer));
   if (pictures.unread > 0)
     remarks.push_back(
-        fmt::format("{} images in HEIC, AVIF or DICOM are left out: convert them to PNG", pictures.unread));
+        fmt::format("{} images in TIFF, HEIC, AVIF or DICOM are left out: convert them to PNG", pictures.unread));
   if (pictures.order.is_ambiguous)
     remarks.push_back(fmt::format("points and signs of the numbers in the names decide the order: {}, {} ... {}",
                                   files[0].filename().string(), files[1].filename().string(),
@@ -160,8 +160,9 @@ Pictures pictures_in(const fs::path& folder) {
     unread += has_unread_extension(entry.path());
   }
   if (files.empty())
-    throw InputError(folder.string(), std::string("has no images") + (unread > 0 ? " but in HEIC, AVIF or DICOM" : "") +
-                                          ", expected some (png, jpg, bmp, tif, webp, ppm)");
+    throw InputError(folder.string(), std::string("has no images") +
+                                          (unread > 0 ? " but in TIFF, HEIC, AVIF or DICOM" : "") +
+                                          ", expected some (png, jpg, bmp, webp, ppm)");
   return {ordered_pictures(std::move(files)), unread};
 }
 

@@ -72,12 +72,12 @@ TEST(FolderSource, OrdersNumbersInNamesByValue) {
 TEST(FolderSource, SaysWhatItLeavesOut) {
   const testing::TemporaryFolder folder;
   testing::write_file(folder / "b.HEIC", "");
-  EXPECT_NE(testing::input_error([&] { open_frame_source(folder.path().string(), 30); }).find("but in HEIC"),
+  EXPECT_NE(testing::input_error([&] { open_frame_source(folder.path().string(), 30); }).find("but in TIFF"),
             std::string::npos);
   write_image(folder / "a.png", cv::Mat(16, 16, CV_8UC3, cv::Scalar(20, 120, 220)));
   const auto source = open_frame_source(folder.path().string(), 30);
   EXPECT_EQ(source->frame_count(), 1);
-  EXPECT_EQ(source->remark(), "1 images in HEIC, AVIF or DICOM are left out: convert them to PNG");
+  EXPECT_EQ(source->remark(), "1 images in TIFF, HEIC, AVIF or DICOM are left out: convert them to PNG");
 }
 
 TEST(FolderSource, SaysTheOrderWherePointsDecide) {

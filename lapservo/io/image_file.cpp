@@ -20,7 +20,6 @@
 #include "lapservo/io/pictures/picture_count.h"
 #include "lapservo/io/pictures/png_encoding.h"
 #include "lapservo/io/pictures/png_picture.h"
-#include "lapservo/io/pictures/tiff_directory.h"
 #include "lapservo/io/tables/numbers.h"
 
 namespace lapservo {
@@ -33,10 +32,6 @@ constexpr std::size_t max_bytes = std::size_t{256} << 20;
 
 bool starts_with(std::span<const std::uint8_t> bytes, std::string_view magic) {
   return bytes.size() >= magic.size() && std::memcmp(bytes.data(), magic.data(), magic.size()) == 0;
-}
-
-[[noreturn]] void refuse_pixel_type(const std::string& source) {
-  throw InputError(source, "pixel type", "floating point or signed", "8 or 16 bits a channel");
 }
 
 struct PictureSize {
@@ -100,12 +95,13 @@ void check_whole(std::span<const std::uint8_t> bytes, const std::string& source)
   if (is_jpeg(bytes)) check_size(jpeg_header(bytes).size, source);
   if (const std::string format = libav_format(bytes); bytes.size() < least_bytes(bytes, format))
     throw InputError(source, "is a truncated " + format + ", expected a whole image");
-  if (!tiff_has_its_rows(bytes)) throw InputError(source, "is a truncated TIFF, expected a whole image");
 }
 
-// "HEIC" or "AVIF" by the brand that follows the box of the file's type; else empty.
+// "TIFF"; "HEIC" or "AVIF" by the brand that follows the box of the file's type; else empty.
 std::string unread_format(std::span<const std::uint8_t> bytes) {
+  using namespace std::string_view_literals;
   const std::string_view text = text_of(bytes).substr(0, 12);
+  if (text.starts_with("II*\0"sv) || text.starts_with("MM\0*"sv)) return "TIFF";
   if (text.size() < 12 || text.substr(4, 4) != "ftyp") return "";
   const std::string_view brand = text.substr(8);
   if (brand == "avif" || brand == "avis") return "AVIF";
@@ -119,16 +115,11 @@ void refuse_several(std::span<const std::uint8_t> bytes, const std::string& sour
                      "holds " + std::to_string(count) + " images, expected one: write them into a folder, one a file");
 }
 
-// FFmpeg takes all samples for unsigned, and YCbCr for a video's.
-void refuse_misread(std::span<const std::uint8_t> bytes, const std::string& source) {
+void refuse_unread(std::span<const std::uint8_t> bytes, const std::string& source) {
   if (const std::string format = unread_format(bytes); !format.empty())
     throw InputError(source, "is in " + format + ", which is not read: convert it to PNG");
   if (is_jpeg(bytes) && jpeg_header(bytes).channels == 4)
     throw InputError(source, "is a JPEG in CMYK, which is not read: convert it to PNG in RGB");
-  constexpr std::size_t photometric = 262, sample_format = 339, ycbcr = 6, is_unsigned = 1;
-  if (tiff_value(bytes, sample_format).value_or(is_unsigned) != is_unsigned) refuse_pixel_type(source);
-  if (tiff_value(bytes, photometric) == ycbcr)
-    throw InputError(source, "is a TIFF in YCbCr, which is not read: convert it to PNG");
 }
 
 DecodedPicture decode(std::span<const std::uint8_t> bytes) {
@@ -140,8 +131,7 @@ DecodedPicture decode(std::span<const std::uint8_t> bytes) {
 }  // namespace
 
 bool has_image_extension(const fs::path& path) {
-  static constexpr std::array<std::string_view, 9> known{".png",  ".jpg",  ".jpeg", ".bmp", ".tif",
-                                                         ".tiff", ".webp", ".ppm",  ".pgm"};
+  static constexpr std::array<std::string_view, 7> known{".png", ".jpg", ".jpeg", ".bmp", ".webp", ".ppm", ".pgm"};
   const std::string extension = lower_case(path.extension().string());
   return std::find(known.begin(), known.end(), extension) != known.end();
 }
@@ -157,7 +147,7 @@ bool is_written(const fs::path& path) {
 
 bool has_unread_extension(const fs::path& path) {
   const std::string extension = lower_case(path.extension().string());
-  static constexpr std::array<std::string_view, 5> known{".heic", ".heif", ".avif", ".dcm", ".dicom"};
+  static constexpr std::array<std::string_view, 7> known{".heic", ".heif", ".avif", ".dcm", ".dicom", ".tif", ".tiff"};
   return std::find(known.begin(), known.end(), extension) != known.end();
 }
 
@@ -166,7 +156,7 @@ cv::Mat bgr8_from(const cv::Mat& image, const std::string& source) {
   if (image.depth() == CV_16U) {
     image.convertTo(eight_bit, CV_8U, 1.0 / 257);
   } else if (image.depth() != CV_8U) {
-    refuse_pixel_type(source);
+    throw InputError(source, "pixel type", "floating point or signed", "8 or 16 bits a channel");
   }
   cv::Mat bgr;
   switch (eight_bit.channels()) {
@@ -187,7 +177,7 @@ Picture decode_picture(std::span<const std::uint8_t> bytes, const std::string& s
   if (bytes.empty()) throw InputError(source, "is empty, expected an image");
   check_whole(bytes, source);
   refuse_several(bytes, source);
-  refuse_misread(bytes, source);
+  refuse_unread(bytes, source);
   // 0 and numbers above 8 have no meaning in EXIF; they are shown upright everywhere.
   if (const auto orientation = exif_orientation(bytes); orientation && *orientation >= 2 && *orientation <= 8)
     throw InputError(source, "EXIF orientation", std::to_string(*orientation),
@@ -196,7 +186,7 @@ Picture decode_picture(std::span<const std::uint8_t> bytes, const std::string& s
   if (is_jpeg(bytes) && !decoded.complaint.empty() && text_of(bytes).rfind("\xff\xd9") == std::string_view::npos)
     throw InputError(source, "is a truncated JPEG, expected a whole image");
   if (decoded.bgr.empty())
-    throw InputError(source, "can't be decoded, expected a PNG, JPEG, BMP, TIFF, WebP, PPM or PGM image");
+    throw InputError(source, "can't be decoded, expected a PNG, JPEG, BMP, WebP, PPM or PGM image");
   check_size({static_cast<std::uint32_t>(decoded.bgr.cols), static_cast<std::uint32_t>(decoded.bgr.rows)}, source);
   Picture picture{bgr8_from(decoded.bgr, source), std::nullopt};
   constexpr std::size_t png_depth = 24;

@@ -12,7 +12,7 @@
 
 namespace lapservo {
 
-/// Whether the name ends like an image's (png, jpg, jpeg, bmp, tif, tiff, webp, ppm, pgm).
+/// Whether the name ends like an image's (png, jpg, jpeg, bmp, webp, ppm, pgm).
 bool has_image_extension(const std::filesystem::path& path);
 
 /// Whether the name ends like a JPEG's (jpg, jpeg).
@@ -21,7 +21,7 @@ bool has_jpeg_extension(const std::filesystem::path& path);
 /// Whether write_image() writes what is named so: PNG or JPEG.
 bool is_written(const std::filesystem::path& path);
 
-/// Whether the name ends like that of an image in HEIC, AVIF or DICOM, which are not read.
+/// Whether the name ends like that of an image in TIFF, HEIC, AVIF or DICOM, which are not read.
 bool has_unread_extension(const std::filesystem::path& path);
 
 /// An image in 8-bit BGR, and why nothing is to be measured in it: `damaged` when its decoder complained.
@@ -33,9 +33,9 @@ struct Picture {
 
 /// Decodes an image. Light that a PNG names by cICP or gAMA is read as sRGB; grey is repeated over the channels, alpha
 /// dropped, 16-bit rounded to 8. Throws InputError for anything that isn't a whole image of the camera's pixels: empty,
-/// larger than 256 MiB, truncated (PNG without its end chunk), not decodable, of several images, HEIC, CMYK, other
-/// pixel types, or to be turned by EXIF, as a calibration belongs to the pixels in one orientation and it is unknown to
-/// which.
+/// larger than 256 MiB, truncated (PNG without its end chunk), not decodable, of several images, TIFF, HEIC, CMYK,
+/// other pixel types, or to be turned by EXIF, as a calibration belongs to the pixels in one orientation and it is
+/// unknown to which.
 Picture read_picture(const std::filesystem::path& path);
 Picture decode_picture(std::span<const std::uint8_t> bytes, const std::string& source);
 

@@ -22,11 +22,10 @@ struct Format {
   std::string_view magic, name;
   AVCodecID codec;
 };
-constexpr std::array formats{Format{"BM"sv, "BMP", AV_CODEC_ID_BMP},      Format{"P1"sv, "PNM", AV_CODEC_ID_PPM},
-                             Format{"P2"sv, "PNM", AV_CODEC_ID_PPM},      Format{"P3"sv, "PNM", AV_CODEC_ID_PPM},
-                             Format{"P4"sv, "PNM", AV_CODEC_ID_PPM},      Format{"P5"sv, "PNM", AV_CODEC_ID_PPM},
-                             Format{"P6"sv, "PNM", AV_CODEC_ID_PPM},      Format{"II*\0"sv, "TIFF", AV_CODEC_ID_TIFF},
-                             Format{"MM\0*"sv, "TIFF", AV_CODEC_ID_TIFF}, Format{"RIFF"sv, "WebP", AV_CODEC_ID_WEBP}};
+constexpr std::array formats{Format{"BM"sv, "BMP", AV_CODEC_ID_BMP}, Format{"P1"sv, "PNM", AV_CODEC_ID_PPM},
+                             Format{"P2"sv, "PNM", AV_CODEC_ID_PPM}, Format{"P3"sv, "PNM", AV_CODEC_ID_PPM},
+                             Format{"P4"sv, "PNM", AV_CODEC_ID_PPM}, Format{"P5"sv, "PNM", AV_CODEC_ID_PPM},
+                             Format{"P6"sv, "PNM", AV_CODEC_ID_PPM}, Format{"RIFF"sv, "WebP", AV_CODEC_ID_WEBP}};
 
 const Format* format_of(std::span<const std::uint8_t> bytes) {
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
@@ -60,8 +59,7 @@ libav::Codec open_decoder(AVCodecID id, std::uint8_t& fill) {
   context->max_pixels = max_pixels;
   context->opaque = &fill;
   context->get_buffer2 = filled_buffer;
-  context->err_recognition = AV_EF_CRCCHECK | AV_EF_BITSTREAM | AV_EF_BUFFER;
-  if (id != AV_CODEC_ID_TIFF) context->err_recognition |= AV_EF_EXPLODE;  // which refuses tags that it does not know
+  context->err_recognition = AV_EF_CRCCHECK | AV_EF_BITSTREAM | AV_EF_BUFFER | AV_EF_EXPLODE;
   return avcodec_open2(context.get(), codec, nullptr) == 0 ? std::move(context) : nullptr;
 }
 
