@@ -168,8 +168,7 @@ Camera parse_camera_fields(const YamlField& field) {
     check_invertible(camera, coefficients["data"]);
   }
   camera.response = parse_response(field["response"]);
-  // By 0 earlier versions said that it was not measured.
-  if (const auto sigma = sigma_in(field, "sigma_response"); sigma != 0) camera.response.sigma = sigma;
+  camera.response.sigma = sigma_in(field, "sigma_response");
   camera.chromatic_aberration = parse_chromatic_aberration(field["lateral_chromatic_aberration"]);
   if (const YamlField deinterlace = field["deinterlace"]; deinterlace.present())
     camera.deinterlace = deinterlace.boolean();

@@ -151,15 +151,6 @@ TEST(Rig, TakesTheOtherKeysOfACameraInfoAndSigmas) {
             "");
 }
 
-TEST(Rig, TakesAResponsesSigmaOfZeroForNone) {
-  const auto sigma = [](const std::string& text) {
-    return parse_rig(with("  response", "  sigma_response: " + text + "\n  response"), "rig.yaml")
-        .camera.response.sigma;
-  };
-  EXPECT_EQ(sigma("0.003"), 0.003);
-  EXPECT_EQ(sigma("0"), std::nullopt);
-}
-
 TEST(Rig, NormalisesARoundedQuaternion) {
   const Rig rig = parse_rig(with("[0, 0, 0.6, 0.8]", "[0, 0, 0.6001, 0.8]"), "rig.yaml");
   EXPECT_NEAR(rig.instruments[0].camera_from_rcm->rotation.norm(), 1, 1e-12);
