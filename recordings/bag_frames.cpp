@@ -14,8 +14,8 @@
 namespace lapservo::internal {
 namespace {
 
-DecodedImage decoded(const BagMessage& message) {
-  if (const auto* raw = std::get_if<ImageMessage>(&message)) return decode(*raw);
+DecodedImage decoded(BagMessage message) {
+  if (auto* raw = std::get_if<ImageMessage>(&message)) return decode(std::move(*raw));
   return decode(std::get<CompressedImageMessage>(message));
 }
 
@@ -34,8 +34,8 @@ const std::string& BagFrames::why() const {
 }
 
 std::optional<BagFrames::Picture> BagFrames::read() {
-  while (const auto message = messages_.next()) {
-    DecodedImage image = decoded(message->message);
+  while (auto message = messages_.next()) {
+    DecodedImage image = decoded(std::move(message->message));
     if (auto* bgr = std::get_if<cv::Mat>(&image)) return Picture{message->time_s, std::move(*bgr)};
     if (unreadable_++ == 0) why_unreadable_ = std::get<BadImage>(image).why;
   }

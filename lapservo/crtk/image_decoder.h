@@ -17,8 +17,8 @@ using DecodedImage = std::variant<cv::Mat, BadImage>;
 
 /// 8-bit BGR of bgr8, rgb8, bgra8, rgba8, bgr16, rgb16 (the upper byte), yuv422 (UYVY; also uyvy, yuv422_yuy2, yuyv),
 /// nv12 and bayer_*8 or bayer_*16 images, whatever their step and byte order. mono8 and mono16 are refused: the marker
-/// has to have colours. At most 16384 pixels wide and high.
-DecodedImage decode(const ImageMessage& message);
+/// has to have colours. At most 16384 pixels wide and high. bgr8 without padding keeps the message's bytes.
+DecodedImage decode(ImageMessage message);
 
 /// The same of a compressed one: JPEG, PNG or what else decode_image() reads, whole and undamaged.
 DecodedImage decode(const CompressedImageMessage& message);

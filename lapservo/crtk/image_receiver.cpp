@@ -117,7 +117,7 @@ std::optional<StampedImage> ImageReceiver::newest() {
     waiting = std::exchange(waiting_, std::nullopt);
   }
   if (!waiting) return std::nullopt;
-  DecodedImage decoded = std::visit([](const auto& message) { return decode(message); }, waiting->message);
+  DecodedImage decoded = std::visit([](auto& message) { return decode(std::move(message)); }, waiting->message);
   const std::lock_guard lock(mutex_);
   if (const auto* bad = std::get_if<BadImage>(&decoded)) {
     refuse(&ImageCounts::unreadable, bad->why);

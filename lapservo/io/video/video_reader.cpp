@@ -227,19 +227,19 @@ class VideoReader::State {
     convert();
     advance(frame_->best_effort_timestamp, libav::duration_of(*frame_));
     av_frame_unref(frame_.get());
-    return counted(spoiled_);
+    return counted(spoiled_, last_);
   }
   Image lost() {
     spoiled_ = true;
     if (last_.empty())
       last_ = cv::Mat::zeros(std::max(1, stream_->codecpar->height), std::max(1, stream_->codecpar->width), CV_8UC3);
     advance(AV_NOPTS_VALUE, 0);
-    return counted(true);
+    return counted(true, last_.clone());
   }
-  Image counted(bool damaged) {
+  Image counted(bool damaged, const cv::Mat& bgr) {
     ++frames_;
     damaged_ += damaged ? 1 : 0;
-    return {last_.clone(), damaged, time_s_.value_or(0)};
+    return {bgr, damaged, time_s_.value_or(0)};
   }
 
   // Frames that the container gives no time, or none later than the frame before, follow at the stream's rate.
@@ -295,6 +295,7 @@ class VideoReader::State {
                        "scale=out_color_matrix=bt709 -colorspace bt709 OUT)");
     if (const std::string expected = expected_transfer(*frame_); !expected.empty())
       throw InputError(source_, "transfer", av_color_transfer_name(frame_->color_trc), expected);
+    last_.release();  // whoever was given it has it
     if (!converter_.convert(*frame_, *colours, fields_, last_))
       throw InputError(source_, "has pixels of a kind that can't be converted, expected a video");
     if (frames_ == 0) note_remarks(*colours);
