@@ -12,10 +12,9 @@
 #include "apps/lapservo/cli/interrupt.h"
 #include "apps/lapservo/cli/progress.h"
 #include "apps/lapservo/cli/subcommands.h"
+#include "apps/lapservo/commands/servo/run_watcher.h"
 #include "apps/lapservo/commands/servo/servo_arm.h"
 #include "apps/lapservo/commands/servo/servo_options.h"
-#include "apps/lapservo/commands/servo/servo_output.h"
-#include "apps/lapservo/commands/servo/servo_page.h"
 #include "apps/lapservo/commands/servo/servo_recording.h"
 #include "apps/lapservo/inputs/frame_input.h"
 #include "apps/lapservo/inputs/joint_input.h"
@@ -55,49 +54,26 @@ JointVector joints_at_start(const ServoOptions& options, const Trajectory& traje
                       run.trajectory_name);
 }
 
-// The user's view of a run: the log, the page, the progress, the last lines.
-class Watcher : public RunObserver {
+class SimulationWatcher : public RunWatcher {
  public:
-  Watcher(FeatureModel true_model, const Simulator& simulator, RunFolder* folder, int ticks, bool strict,
-          ServoPage* page, Supervisor& arm)
-      : true_model_(std::move(true_model)),
+  SimulationWatcher(const ServoOptions& options, std::unique_ptr<RunFolder> folder, Supervisor& arm, ServoPage* page,
+                    FeatureModel true_model, const Simulator& simulator, int ticks)
+      : RunWatcher(options, std::move(folder), &arm, page),
+        true_model_(std::move(true_model)),
         simulator_(simulator),
-        folder_(folder),
-        progress_(std::make_unique<Progress>(ticks)),
-        strict_(strict),
-        page_(page),
-        arm_(arm) {}
-
-  bool on_tick(const ControlTick& tick) override {
-    const InstrumentTruth truth = truth_at(true_model_, simulator_.true_q());
-    const std::string state = state_text(tick.decision, arm_);
-    summary_.add(tick, truth, block_of(arm_));
-    if (folder_) folder_->add(tick, truth);
-    progress_->show(++done_, fmt::format(" ({})", to_string(tick.decision.control.action)));
-    if (strict_ && summary_.registration_contradicted()) return false;
-    if (page_ && !obey_page(tick, state)) return false;
-    return !interrupted();
-  }
-  const RunSummary& finish() {
-    progress_.reset();
-    return summary_;
-  }
+        progress_(ticks) {}
+  void end_progress() { progress_.clear(); }
 
  private:
-  // False when it ends the run.
-  bool obey_page(const ControlTick& tick, const std::string& state) {
-    page_->tell(tick, tick.input.time_s, state, arm_.can_start());
-    return !page_->command(arm_, tick.input.time_s);
+  bool follow(const ControlTick& tick, double) override {
+    progress_.show(++done_, fmt::format(" ({})", to_string(tick.decision.control.action)));
+    return true;
   }
+  std::optional<InstrumentTruth> truth() const override { return truth_at(true_model_, simulator_.true_q()); }
 
   FeatureModel true_model_;
   const Simulator& simulator_;
-  RunFolder* folder_;
-  std::unique_ptr<Progress> progress_;
-  bool strict_;
-  ServoPage* page_;
-  Supervisor& arm_;
-  RunSummary summary_;
+  Progress progress_;
   int done_ = 0;
 };
 
@@ -118,21 +94,17 @@ int simulate(const ServoOptions& options) {
   if (options.web.port) page.emplace(options, config.rig, "servo, simulated", true);
   Supervisor arm(simulator, simulator);
   if (options.page_says_operator_present()) arm.watch_operator([&] { return page->operator_present(); });
-  std::optional<RunFolder> folder;
-  if (!options.out.empty()) folder.emplace(options, duration_s(options), believed_rig, config.controller, &true_rig);
+  auto folder = run_folder(options, duration_s(options), believed_rig, config.controller, &true_rig);
   watch_for_interrupts();
 
-  Watcher watcher(true_model, simulator, folder ? &*folder : nullptr,
-                  static_cast<int>(std::lround(duration_s(options) / config.controller.period_s)), options.strict,
-                  page ? &*page : nullptr, arm);
+  SimulationWatcher watcher(options, std::move(folder), arm, page ? &*page : nullptr, true_model, simulator,
+                            static_cast<int>(std::lround(duration_s(options) / config.controller.period_s)));
   lapservo::run(arm, simulator, simulator, config, trajectory, duration_s(options), watcher);
-  const RunSummary& summary = watcher.finish();
+  watcher.end_progress();
   std::printf("method %s, seen by %s\n%s\n", std::string(to_string(config.controller.mode)).c_str(),
               config.tracker.method == Method::centerline ? "the paper's Algorithm 1" : "all visible lines",
-              summary.text().c_str());
-  const bool logged = !folder || folder->commit();
-  if (folder && logged) std::printf("log, rig and controller: %s\n", options.out.c_str());
-  return summary.succeeded(options.strict) && logged ? 0 : 1;
+              watcher.summary().text().c_str());
+  return watcher.commit_log() && watcher.summary().succeeded(options.strict) ? 0 : 1;
 }
 
 int replay_log(const ServoOptions& options) {

@@ -14,8 +14,7 @@
 #include <fmt/format.h>
 
 #include "apps/lapservo/cli/interrupt.h"
-#include "apps/lapservo/commands/servo/servo_output.h"
-#include "apps/lapservo/commands/servo/servo_page.h"
+#include "apps/lapservo/commands/servo/run_watcher.h"
 #include "apps/lapservo/inputs/live_images.h"
 #include "apps/lapservo/inputs/transports.h"
 #include "lapservo/control/trajectory_check.h"
@@ -62,57 +61,36 @@ class Goal {
 };
 
 // Every change is reported once, in one line.
-class ArmWatcher : public RunObserver {
+class ArmWatcher : public RunWatcher {
  public:
-  ArmWatcher(const ServoOptions& options, const RunConfig& run, Supervisor& arm, const CrtkRobot& robot,
-             LiveImages& images, LoopTopics& topics, Goal& goal, RunFolder* folder, ServoPage* page)
-      : options_(options),
+  ArmWatcher(const ServoOptions& options, std::unique_ptr<RunFolder> folder, Supervisor& arm, ServoPage* page,
+             const RunConfig& run, const CrtkRobot& robot, LiveImages& images, LoopTopics& topics, Goal& goal)
+      : RunWatcher(options, std::move(folder), &arm, page),
+        options_(options),
         run_(run),
         arm_(arm),
         robot_(robot),
         images_(images),
         topics_(topics),
-        goal_(goal),
-        folder_(folder),
-        page_(page) {}
+        goal_(goal) {}
 
-  bool on_tick(const ControlTick& tick) override {
-    if (!start_s_) start_s_ = tick.input.time_s;
-    const double time_s = tick.input.time_s - *start_s_;
-    summary_.add(tick, std::nullopt, block_of(arm_));
-    if (const auto& motions = summary_.endoscope_motions(); motions.size() > said_motions_) {
+ private:
+  bool follow(const ControlTick& tick, double time_s) override {
+    if (const auto& motions = summary().endoscope_motions(); motions.size() > said_motions_) {
       say(time_s, motions.back());
       said_motions_ = motions.size();
     }
-    if (folder_) folder_->add(tick, std::nullopt);
-    say_state(time_s, state_text(tick.decision, arm_));
+    if (is_new_state()) say(time_s, state());
     say_images(time_s);
-    topics_.publish(tick, state_ == to_string(ControlAction::track) ? "" : state_);
+    topics_.publish(tick, state() == to_string(ControlAction::track) ? "" : state());
     obey(topics_.wishes(), tick, time_s);
     if (!options_.enable_motion) say_what_would_be_sent(time_s);
-    if (page_ && obey_page(tick, time_s)) return false;
     if (images_.take_second_sender()) arm_.report(Blocked::second_camera);
     if (topics_.name_is_in_use()) {
       say(time_s, "end: " + name_in_use(run_.rig));
       return false;
     }
-    if (options_.strict && summary_.registration_contradicted()) return false;
-    return !interrupted();
-  }
-  const RunSummary& summary() const { return summary_; }
-
- private:
-  // True when it ends the run.
-  bool obey_page(const ControlTick& tick, double time_s) {
-    page_->tell(tick, time_s, state_, arm_.can_start());
-    const bool ends = page_->command(arm_, tick.input.time_s);
-    if (ends) say(time_s, "end: requested on the page");
-    return ends;
-  }
-  void say_state(double time_s, const std::string& state) {
-    if (state == state_) return;
-    state_ = state;
-    say(time_s, state);
+    return true;
   }
   void obey(const LoopWishes& wishes, const ControlTick& tick, double time_s) {
     for (const std::uint64_t source : wishes.stops) arm_.stop({Commander::topic, source});
@@ -179,8 +157,6 @@ class ArmWatcher : public RunObserver {
   LiveImages& images_;
   LoopTopics& topics_;
   Goal& goal_;
-  RunFolder* folder_;
-  ServoPage* page_;
   struct Wanted {
     std::string name;
     double duration_s = 0;
@@ -189,10 +165,8 @@ class ArmWatcher : public RunObserver {
   };
   std::optional<Wanted> wanted_;  // to be checked next
   Wanted asked_;
-  RunSummary summary_;
-  std::optional<double> start_s_;
   double next_counts_s_ = 0, next_set_point_s_ = 0;
-  std::string state_, said_counts_;
+  std::string said_counts_;
   std::set<std::string> said_remarks_;
   bool said_ended_ = false;
   std::size_t said_motions_ = 0;
@@ -288,18 +262,16 @@ int steer_arm(const ServoOptions& options) {
   }
   if (const std::string not_granted = robot.not_granted(); options.enable_motion && !not_granted.empty())
     std::printf("setpoints leave without %s, see docs/ros.md\n", not_granted.c_str());
-  std::optional<RunFolder> folder;
-  if (!options.out.empty()) folder.emplace(options, duration_s(options), rig, config.controller);
+  auto folder = run_folder(options, duration_s(options), rig, config.controller);
 
   Goal goal(trajectory);
-  ArmWatcher watcher(options, config, arm, robot, images, topics, goal, folder ? &*folder : nullptr, its_page);
+  ArmWatcher watcher(options, std::move(folder), arm, its_page, config, robot, images, topics, goal);
   if (page && page->command(arm, clock.now_s())) return end_by_page();
   request_real_time(loop_priority);  // the robot has said what is not granted
   lapservo::run(arm, images, clock, config, goal.trajectory(), duration_s(options), watcher);
   say_counts(robot.counts(), images.counts());
   std::printf("%s\n", watcher.summary().text().c_str());
-  const bool logged = !folder || folder->commit();
-  return watcher.summary().succeeded(options.strict) && logged ? 0 : 1;
+  return watcher.commit_log() && watcher.summary().succeeded(options.strict) ? 0 : 1;
 }
 
 }  // namespace lapservo::app

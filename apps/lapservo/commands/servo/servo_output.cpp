@@ -60,4 +60,10 @@ bool RunFolder::commit() {
   return true;
 }
 
+std::unique_ptr<RunFolder> run_folder(const ServoOptions& options, double duration_s, const Rig& rig,
+                                      const ControllerConfig& controller, const Rig* truth) {
+  if (options.out.empty()) return nullptr;
+  return std::make_unique<RunFolder>(options, duration_s, rig, controller, truth);
+}
+
 }  // namespace lapservo::app

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 
@@ -29,5 +30,9 @@ class RunFolder {
   ServoLog log_;
   bool failed_ = false;
 };
+
+/// By --out; none without it.
+std::unique_ptr<RunFolder> run_folder(const ServoOptions& options, double duration_s, const Rig& rig,
+                                      const ControllerConfig& controller, const Rig* truth = nullptr);
 
 }  // namespace lapservo::app
