@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """check_words.py: removed words (docs/glossary.md has the terms to use instead) in the pages for users and in comments, docstrings and
-messages of the sources. Not read: code in pages, names in backticks, targets of links, and lapservo/vision."""
+messages of the sources. Not read: code in pages, names in backticks and targets of links."""
 import io
 import re
 import subprocess
@@ -60,7 +60,7 @@ def main() -> int:
         path = Path(name)
         if path.suffix == ".md" and (len(path.parts) == 1 or path.parts[0] == "docs"):
             prose = prose_of_page(path.read_text())
-        elif path.suffix in {".cpp", ".h", ".js"} and path.parts[:2] != ("lapservo", "vision"):
+        elif path.suffix in {".cpp", ".h", ".js"}:
             prose = comments_of_c(path.read_text())
         elif path.suffix == ".py" and path != Path("docs/site/check_words.py"):
             prose = comments_of_python(path.read_text())

@@ -18,8 +18,8 @@ inline std::array<Eigen::Vector2d, 4> zero_points() {
   return {zero, zero, zero, zero};
 }
 
-/// What one frame tells of one instrument. Its numbers are meaningful only when `status` is Status::ok; then every one
-/// is finite. Sigmas are one standard deviation.
+/// The measurement of one instrument in one frame. Its numbers are meaningful only when `status` is Status::ok; then
+/// every one is finite. Sigmas are one standard deviation.
 struct Observation {
   static constexpr double false_rad = 0.1;  ///< psi that is off by more is wrong
   static constexpr double usual_max_p_false = 1e-3;
@@ -50,8 +50,8 @@ struct Observation {
   double sigma_tau_rad = 0;
   std::array<Eigen::Vector2d, 4> edges_ideal_px = zero_points();  ///< e0..e3 on the centre line
   std::array<Eigen::Vector2d, 4> edges_raw_px = zero_points();
-  /// Of edges_ideal_px, as the image alone or with camera_from_rcm was fitted; to first order. Singular: the points lie
-  /// on a line and move with the pose.
+  /// Covariance of edges_ideal_px, as the image alone or with camera_from_rcm was fitted; to first order. Singular: the
+  /// points lie on a line and move with the pose.
   EdgesCovariance edges_covariance_px2 = EdgesCovariance::Zero();
   Features features;  ///< their covariance: features_covariance()
 
@@ -63,7 +63,7 @@ struct Observation {
   Rigid3 camera_from_unrolled;
   double psi_rad = 0;  ///< in the azimuth reference of camera_from_unrolled
 
-  /// Of a frame that is not ok: what was taken for the marker and refused. To be drawn, so that a person sees why; for
+  /// In a frame that is not ok: what was taken for the marker and refused. To be drawn, so that a person sees why; for
   /// nothing else, since it may lie anywhere. Finite.
   struct Refused {
     enum class What { nothing, pose, edges } what = What::nothing;

@@ -56,7 +56,7 @@ TEST(Observation, EveryStatusHasAWordOfItsOwn) {
   }
 }
 
-// Pose, centre line, edges, features and tau tell the same.
+// Pose, centre line, edges, features and tau agree.
 void expect_consistent(const Shot& shot, bool with_rcm) {
   const Observation o = observe(shot, with_rcm);
   ASSERT_EQ(o.status, Status::ok);

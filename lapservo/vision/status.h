@@ -14,7 +14,7 @@ enum class Status {
   poor_fit,         ///< something was found that does not look like the marker on closer sight
   uncertain,        ///< found, but the rotation's standard deviation is too large to be of use
   marker_mismatch,  ///< the print is not as the rig says: calibrate the marker
-  damaged,          ///< the decoder of the picture or video complained: its pixels are not the camera's
+  damaged,          ///< the decoder of the image or video complained: its pixels are not the camera's
   interlaced,       ///< the frame is made of two fields, of two moments: use --deinterlace
 };
 std::string_view to_string(Status status);

@@ -55,7 +55,7 @@ Scene SurfaceTracker::scene_of(const ImageView& image, std::size_t i) const {
   return scene;
 }
 
-// What this frame shows of the print.
+// This frame's evidence about the print.
 void SurfaceTracker::learn_print(std::size_t i) {
   const Found& found = found_[i];
   using View = PrintRecord::View;
@@ -102,7 +102,7 @@ void SurfaceTracker::cover_found(std::size_t i, const std::vector<Blob>& blobs, 
   }
 }
 
-// What others hide of it matters only where it can't be followed without, or could not last time.
+// The parts that others hide matter only where it can't be followed without, or could not last time.
 Found SurfaceTracker::follow_known(const ImageView& image, const LightImage& light, std::size_t i, WorkBudget& budget) {
   const InstrumentMemory& memory = *memory_[i];
   const auto follow_it = [&] {

@@ -65,7 +65,7 @@ class SurfaceTracker {
   bool followed_twice_ = false, followed_in_vain_ = false;  // in this frame, one of them
   std::vector<std::size_t> searched_beside_;                // so many others the search is among, by instrument
   std::vector<Found> found_;
-  std::vector<ShaftCover> covers_;         // where somebody asked in this frame
+  std::vector<ShaftCover> covers_;         // where somebody wanted it in this frame
   std::vector<const ShaftCover*> others_;  // that may hide or touch the one that is looked for
   std::vector<Observation> observations_;
 };

@@ -87,7 +87,7 @@ TEST(SurfaceTracker, FindsAnInstrumentAnew) {
   }
 }
 
-// The camera turned upside down sees the picture upside down, and the instrument where it was.
+// The camera turned upside down sees the image upside down, and the instrument where it was.
 TEST(SurfaceTracker, ATurnedCameraSeesTheSame) {
   Rig rig = scenes::usual_rig();
   rig.camera.distortion = {-0.2, 0.05, 0.0006, -0.0004, 0};
@@ -129,7 +129,7 @@ TEST(SurfaceTracker, FollowingTellsTheSameAsLookingAnew) {
   }
 }
 
-// A defocused picture can't tell that the camera sharpens, and the next one may start from its blur: they are less sure
+// A defocused image can't show that the camera sharpens, and the next one may start from its blur: they are less sure
 // then, and those that follow are corrected again.
 TEST(SurfaceTracker, RemembersThatTheCameraSharpens) {
   Rig rig = scenes::usual_rig();
@@ -354,7 +354,7 @@ TEST(SurfaceTracker, AToleranceOfThePrintEntersSigma) {
 
 struct TwoOfOnePrint {
   Rig both = scenes::usual_rig(2);  ///< as things are
-  Rig one = scenes::usual_rig();    ///< as it is believed, without the RCM
+  Rig one = scenes::usual_rig();    ///< as it is assumed, without the RCM
 };
 TwoOfOnePrint two_of_one_print() {
   TwoOfOnePrint rigs;
@@ -426,7 +426,7 @@ TEST(SurfaceTracker, TwoOfTheSamePrintStayAmbiguousWithinAnyBudget) {
   EXPECT_GE(candidates, 30) << "the test's own power";
 }
 
-// A rig a few millimetres off looks like a print that is: what needs no registration is told all the same.
+// A rig a few millimetres off looks like a misprint: what needs no registration is given all the same.
 TEST(SurfaceTracker, AContradictedRegistrationIsNoMismatchedMarkerWithinABudget) {
   int contradicted = 0;
   for (std::uint64_t seed = 1; seed <= 6; ++seed) {
@@ -518,8 +518,8 @@ class TurningInstrument {
   Observation seen_;
 };
 
-// Where blood hides an inner boundary, a print that is off would look like a turn: not one that was seen before, unless
-// the instrument may have been exchanged since.
+// Where blood hides an inner boundary, a misprint would look like a turn: not one that was seen before, unless the
+// instrument may have been exchanged since.
 TEST(SurfaceTracker, APrintThatWasSeenIsTrustedUnderBlood) {
   constexpr int markers = 8, frames = 4;
   constexpr double step_rad = 0.1;
@@ -582,7 +582,7 @@ cv::Mat with_strips(cv::Mat image, const Marker& marker) {
   return image;
 }
 
-// What was ok is not so in a frame without it, however far the search for it comes.
+// An ok is not kept in a frame without it, however far the search for it comes.
 TEST(SurfaceTracker, WhatIsLostIsNotOkWhileItIsLookedFor) {
   int lost = 0;
   for (const std::size_t instruments : {1U, 2U})
@@ -611,7 +611,7 @@ TEST(SurfaceTracker, WhatIsLostIsNotOkWhileItIsLookedFor) {
   EXPECT_GE(lost, 40) << "the test's own power";
 }
 
-// What one frame's long search finds, frames with a budget find together, and in the same frames each time.
+// Frames with a budget find together what one frame's long search finds, and in the same frames each time.
 TEST(SurfaceTracker, SpreadsALongSearchOverFrames) {
   const Rig rig = measured_rig();
   constexpr double frame_budget = 6000;
@@ -676,7 +676,7 @@ cv::Mat render_turning(const Rig& rig, const JointVector& q, double turn_rad, bo
       .render_exposure(scenes::moving_exposure(rig, q, {.turn_rad = turn_rad, .from_rest = !even}), 1);
 }
 
-// The picture shows psi's mean over the exposure.
+// The image shows psi's mean over the exposure.
 TEST(SurfaceTracker, ATurnWithinTheExposureGivesPsiOfItsMiddle) {
   double squares = 0, from_rest_squares = 0;
   for (std::uint64_t seed = 1; seed <= 3; ++seed)
@@ -748,7 +748,7 @@ TEST(SurfaceTracker, FindsInstrumentsThatCross) {
   EXPECT_GE(found, 0.9 * tell);
 }
 
-// What the other instrument hides is no boundary that lies elsewhere.
+// A part that the other instrument hides is no boundary that lies elsewhere.
 TEST(SurfaceTracker, FollowsInstrumentsThatCross) {
   const Rig rig = scenes::usual_rig(2);
   Random random(4);

@@ -83,7 +83,7 @@ struct Tracker::State {
   void name_observations() {
     for (std::size_t i = 0; i < observations.size(); ++i) observations[i].instrument = rig.instruments[i].name;
   }
-  // What lies between two moments is no observation of either, and nothing to start the next frame from.
+  // A frame between two moments is no observation of either, and nothing to start the next frame from.
   void refuse_combed(const cv::Mat& image_bgr) {
     const ImageView image(image_bgr);
     for (std::size_t i = 0; i < observations.size(); ++i) {

@@ -24,13 +24,14 @@ struct TrackerOptions {
   Method method = Method::surface;
   bool single = false;       ///< treat every frame on its own instead of starting from the frame before
   bool deinterlace = false;  ///< track the field of the even rows; also when the rig's camera says so
-  /// Method::surface: what looking at a frame may cost, in units of work; nullopt: as much as it takes. A unit is about
-  /// half a microsecond of a core of 2.3 GHz, but counted, not measured by a clock: the same frames give the same
-  /// results whatever else the machine does. An instrument that is followed takes 500 to 700, 3000 where the camera's
+  /// Method::surface: the budget of a frame, in units of work; nullopt: as much as it takes. A unit is about half a
+  /// microsecond of a core of 2.3 GHz, but counted, not measured by a clock: the same frames give the same results
+  /// whatever else the machine does. An instrument that is followed takes 500 to 700, 3000 where the camera's
   /// processing shows; a search for one that is hidden, a hundred times that, goes on in the frames to come where it
-  /// stopped. Until it comes to its end the status is what is known so far. Pictures that don't follow one another need
-  /// nullopt. Frames of `single` are always searched whole. What can't wait for the next frame goes beyond the budget:
-  /// who is followed, a second print's place, a registration that is contradicted, a shaft that the border cuts.
+  /// stopped. Until it comes to its end the status is what is known so far. Images that don't follow one another need
+  /// nullopt. Frames of `single` are always searched whole. Work that can't wait for the next frame goes beyond the
+  /// budget: who is followed, a second print's place, a registration that is contradicted, a shaft that the border
+  /// cuts.
   std::optional<double> frame_budget = 8000;
   /// Method::surface: an instrument is `uncertain` where Observation::p_false is larger, beyond 1.5 times what the
   /// rig's own tolerance of the print adds. Above 0, at most 1.
@@ -38,7 +39,7 @@ struct TrackerOptions {
 };
 
 /// Finds all instruments of a rig in the frames of one camera. Holds what it learnt from the frames before: where they
-/// were, what the camera does to its pictures, and whether each print is the rig's; the latter until the marker was out
+/// were, what the camera does to its images, and whether each print is the rig's; the latter until the marker was out
 /// of sight for 2 s, in which the instrument may have been exchanged.
 class Tracker {
  public:
@@ -52,11 +53,11 @@ class Tracker {
   /// its order. `time_s`: when the frame was taken, by any clock. Frames without it, and those whose times do not go
   /// on, count as taken 1/32 s after the one before.
   const std::vector<Observation>& track(const cv::Mat& image_bgr, std::optional<double> time_s = std::nullopt) &;
-  /// Of a tracker that is gone after the expression, as in `Tracker(rig).track(image)`: by value. There is no frame to
+  /// For a tracker that is gone after the expression, as in `Tracker(rig).track(image)`: by value. There is no frame to
   /// come, so this one is searched whole.
   std::vector<Observation> track(const cv::Mat& image_bgr) &&;
 
-  /// Of a frame whose pixels are not the camera's, as a damaged one's: one observation per instrument, of this status.
+  /// For a frame whose pixels are not the camera's, as a damaged one's: one observation per instrument, of this status.
   /// Forgets the frame before.
   const std::vector<Observation>& refuse(Status why) &;
 

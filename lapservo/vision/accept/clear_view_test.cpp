@@ -51,7 +51,7 @@ TEST(ClearView, NothingHidesABoundaryButBlood) {
       EXPECT_GT(lines_in_clear_view(shot.sight.scene(), pose, boundary, lines), lines / 2) << boundary;
       const Sight bloody(shot.rig, with_blood_along(shot, boundary));
       EXPECT_LE(lines_in_clear_view(bloody.scene(), pose, boundary, lines), 2) << boundary;
-      // A print that is off is no blood.
+      // A misprint is no blood.
       EXPECT_GT(lines_in_clear_view(shot.sight.scene(), moved_along(shot, 0.3e-3), boundary, lines), lines / 3)
           << boundary;
     }

@@ -17,7 +17,7 @@ bool is_doubtful(const FineFit& fit, std::size_t boundary) {
   return fit.used[boundary] < limits.located * fit.lines;
 }
 
-// Of how many residuals one is about the middle, at most.
+// The largest number of residuals that lie about one of them.
 int most_alike(const Residuals& residuals_px) {
   std::ptrdiff_t most = 0;
   for (const double middle_px : residuals_px)

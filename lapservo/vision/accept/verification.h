@@ -20,7 +20,7 @@ struct ValidationLimits {
   /// Of a boundary's lines in clear view: located on fewer, it is not where it should be.
   double missed_fraction = 0.3;
   /// Wrong fits agree with few boundaries or sides, and badly; blood leaves few, which agree well; compression leaves
-  /// many, noisy. So the boundaries' mean square may grow with the located fraction. Of the sides half is enough.
+  /// many, noisy. So the boundaries' mean square may grow with the located fraction. Half of the sides is enough.
   double max_rms_sigmas = 2.2, enough_of_sides = 0.5;
 };
 inline constexpr ValidationLimits validation_limits;

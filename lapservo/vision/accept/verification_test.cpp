@@ -128,7 +128,7 @@ TEST(Verification, TheLessShowsTheBetterItMustAgree) {
   EXPECT_LT(most_rms_sigmas(few_sides), 0.6 * whole);
 }
 
-// Its depth is what both ends tell.
+// Its depth is that of both ends.
 TEST(Verification, WithoutTheRcmBothEndsAreNeeded) {
   const Shot& shot = usual_shot(1);
   const Scene scene = shot.sight.scene();

@@ -56,7 +56,7 @@ using Channels = Eigen::Array3d;  // b, g, r
 // Where each channel shows an edge, from where all of them do, and how much its light changes there.
 struct ChannelSteps {
   Channels offset_px, step;
-  Channels gloss_px = Channels::Zero();  // by how much gloss and shading may move each
+  Channels gloss_px = Channels::Zero();  // by how much specular light and shading may move each
 };
 
 template <typename LightOf>
@@ -73,7 +73,7 @@ ChannelSteps channel_steps(const StepColumns& columns, const PooledEdge& edge, f
     density[channel] = static_cast<double>(by_density / columns.density_square);
   }
   ChannelSteps out{-static_cast<double>(blur_px) * density / step, step};
-  // Gloss is white: it shows alone in a channel in which both sides of the edge look alike.
+  // Specular light is white: it shows alone in a channel in which both sides of the edge look alike.
   Eigen::Index alike = 0;
   if (step.abs().minCoeff(&alike) < believed.least_step * step.abs().maxCoeff())
     out.gloss_px = static_cast<double>(blur_px) * std::abs(density[alike]) / step.abs();
@@ -116,7 +116,7 @@ struct Disagreement {
   bool is_plain() const { return degrees >= believed.least_degrees && squares > believed.least_squares; }
 };
 
-// What a few numbers explain of the offsets.
+// The part of the offsets that a few numbers explain.
 template <int Numbers>
 struct Explanation {
   using Vector = Eigen::Matrix<double, Numbers, 1>;
@@ -175,7 +175,7 @@ CameraDeparture by_aberration(const SeenBoundaries& seen, const Explanation<2>& 
   return out;
 }
 
-// It may be gloss or shading as well.
+// It may be specular light or shading as well.
 CameraDeparture doubted_aberration(const SeenBoundaries& seen, Explanation<2> explanation) {
   explanation.sigma = explanation.sigma.cwiseMax(explanation.found.cwiseAbs());
   explanation.found.setZero();
@@ -208,7 +208,7 @@ SeenBoundaries seen_in(const ChannelGeometry& channels, const PooledEdges& edges
   return seen;
 }
 
-// Of values on the way between two pixels: along straight lines, too.
+// The same for values between two pixels: along straight lines, too.
 float light_between(const std::array<float, 256>& light_of_value, float value) {
   const float place = std::clamp(255 * value, 0.0F, 254.99F);
   const auto i = static_cast<std::size_t>(place);
@@ -229,7 +229,8 @@ void differ_by_exponent(double blur_px, SeenBoundaries& seen) {
   }
 }
 
-// Gloss beside one boundary looks like another response there; a camera's shows at all: most of it without any of them.
+// Specular light beside one boundary looks like another response there; a camera's shows at all: most of it without any
+// of them.
 bool is_at_more_than_one(const SeenBoundaries& seen, double exponent) {
   double information = 1 / (believed.usual_exponent * believed.usual_exponent), gradient = 0;
   const auto add = [&](const SeenBoundary& boundary, double sign) {
@@ -263,7 +264,7 @@ std::optional<CameraDeparture> CameraDeparture::then(const CameraDeparture& more
     out.exponent *= more.exponent;
     out.sigma_exponent = more.sigma_exponent, out.doubt_of_response_px = more.doubt_of_response_px;
   }
-  // So near to the rig's response nothing would have been believed.
+  // So near to the rig's response nothing would have been accepted.
   if (std::abs(out.exponent - 1) < believed.least_exponent)
     out.exponent = 1, out.sigma_exponent = 0, out.doubt_of_response_px = {};
   const double magnified = std::max(std::abs(out.aberration.blue - 1), std::abs(out.aberration.red - 1));
@@ -281,7 +282,7 @@ DepartedLight::DepartedLight(const LightImage& light, const CameraDeparture& dep
 std::optional<CameraDeparture> find_departure(const LightImage& light, std::span<const Measurement> measurements,
                                               const PooledEdges& glance, double blur_px) {
   const ChannelGeometry& channels = light.channels();
-  if (!(channels.corner_px > 0)) return std::nullopt;  // of a frame whose middle nobody told
+  if (!(channels.corner_px > 0)) return std::nullopt;  // of a frame whose middle nobody gave
   const auto light_of = [&](float value) { return light_between(light.light_of_value(), value); };
   if (!Disagreement(seen_in(channels, glance, blur_px, light_of)).is_plain()) return std::nullopt;
   // Means of values have dark edges, which look like another response.

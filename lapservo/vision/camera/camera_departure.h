@@ -12,7 +12,7 @@
 
 namespace lapservo::internal {
 
-/// When a camera is believed to differ from the rig's.
+/// When a camera counts as another than the rig's.
 struct DepartureLimits {
   int reach_px = 4;  ///< across a boundary
   /// One sigma of where a channel shows a boundary, by its share of the largest change of light: shading and ink move
@@ -21,19 +21,19 @@ struct DepartureLimits {
   double farthest_px = 1;  ///< what is farther from the others is no boundary
   /// Magnifications of lenses, beside 1; exponents of responses, too, and by how much the latter are tried.
   double usual_aberration = 2e-3, usual_exponent = 0.3, exponent_step = -0.1;
-  /// What no camera has: the border's red and blue 10 px apart, light to the power of 0.5.
+  /// Beyond any camera: the border's red and blue 10 px apart, light to the power of 0.5.
   double most_aberration = 0.01, most_exponent = 0.5;
   int least_degrees = 4;
   /// Squared sigmas: of all by which channels disagree, and left a degree where that is explained (at least, by which
-  /// gains are told; of a response at most, or it is gloss).
+  /// gains are weighed; of a response at most, or it is specular light).
   double least_squares = 2.5, least_scatter = 0.3, most_response_scatter = 0.8;
-  /// What one number explains, by the scatter; and of a response, which must be another besides. Of clean pictures with
-  /// highlights magnifications gain up to 6.3, of a steep marker with crosstalk 9.6; real ones mostly 15 and more.
+  /// The gain of one number, by the scatter; and of a response, which must be another besides. Magnifications of clean
+  /// images with highlights gain up to 6.3, of a steep marker with crosstalk 9.6; real ones mostly 15 and more.
   double least_gain = 11, least_response_gain = 5.5, least_exponent = 0.06;
   /// From where on a magnification may be there: highlights gain as much, but leave 0.6 and more (a swing of 72 frames;
-  /// magnifications that were not believed 0.1 to 0.25).
+  /// magnifications that were not accepted 0.1 to 0.25).
   double least_doubted_gain = 4, most_doubted_scatter = 0.4;
-  double least_of_others = 0.5;  ///< of an exponent, told without any one of the boundaries
+  double least_of_others = 0.5;  ///< of an exponent, measured without any one of the boundaries
   /// A departure's sigma takes in a part of what is left, most of which is common to all frames (exponents of 53 frames
   /// had a standard deviation of 0.008, for 0.028 by all of it), and of a response a part of itself: it is no power.
   double told_of_scatter = 0.5, told_of_response_scatter = 0.2, doubted_of_response = 0.03;
@@ -41,8 +41,8 @@ struct DepartureLimits {
 };
 inline constexpr DepartureLimits departure_limits;
 
-/// What a camera does to its pictures that the rig's camera does not say, as frames show it. Of a magnification that
-/// may be there or not there is only the sigma.
+/// Effects of a camera that the rig's camera does not have, as frames show them. A magnification that may be there or
+/// not is only the sigma.
 struct CameraDeparture {
   ChromaticAberration aberration = {}, sigma_aberration{0, 0};  ///< times the rig's
   double exponent = 1, sigma_exponent = 0;                      ///< light is the rig's to this power
@@ -50,7 +50,7 @@ struct CameraDeparture {
   /// the principal point along its normal; and of the response [px].
   std::array<double, 4> doubt_of_radial{}, doubt_of_response_px{};
 
-  /// Whether any of it is in doubt.
+  /// Whether any of it is uncertain.
   bool doubted() const { return sigma_exponent != 0 || sigma_aberration != ChromaticAberration{0, 0}; }
   bool any() const { return exponent != 1 || aberration != ChromaticAberration{}; }
   /// Whether edges are seen at the same places through both.
@@ -77,16 +77,15 @@ class DepartedLight {
   LightImage light_;
 };
 
-/// What is there beyond what `light` undoes already: of lateral chromatic aberration and a response that is not the
-/// rig's, the one that explains where the three channels show the boundaries; nullopt where nothing needs explaining.
-/// `glance` is what glance_at() makes of
-/// `light` and `measurements`, `blur_px` what fit_step was told. Of pictures that were processed (picture_processing.h)
-/// it may say anything.
+/// Effects beyond what `light` undoes already: of lateral chromatic aberration and a response that is not the rig's,
+/// the one that explains where the three channels show the boundaries; nullopt where nothing needs explaining. `glance`
+/// is what glance_at() makes of `light` and `measurements`, `blur_px` what fit_step was given. For processed images
+/// (picture_processing.h) it is arbitrary.
 std::optional<CameraDeparture> find_departure(const LightImage& light, std::span<const Measurement> measurements,
                                               const PooledEdges& glance, double blur_px);
 
 /// By how much each boundary is seen farther along its normal, by an exponent of light that is larger by 1 [px]; 0
-/// where it is not seen. `blur_px`: what fit_step was told.
+/// where it is not seen. `blur_px`: what fit_step was given.
 std::array<double, 4> moved_by_exponent_px(const LightImage& light, std::span<const Measurement> measurements,
                                            double blur_px);
 

@@ -68,7 +68,7 @@ TEST(CameraDeparture, MagnificationsThatTheRigDoesNotKnowAreFound) {
     errors.add(shot, seen, fit);
     const CameraDeparture& found = fit.departure;
     EXPECT_EQ(found.exponent, 1);
-    if (found.aberration == ChromaticAberration{}) continue;  // near the middle of the picture there is none
+    if (found.aberration == ChromaticAberration{}) continue;  // near the middle of the image there is none
     EXPECT_LT(std::abs(found.aberration.blue - aberration.blue), 3 * found.sigma_aberration.blue);
     EXPECT_LT(std::abs(found.aberration.red - aberration.red), 3 * found.sigma_aberration.red);
   }
@@ -121,7 +121,7 @@ TEST(CameraDeparture, IsKeptByFramesThatAreNotAsked) {
   EXPECT_NEAR(again.departure.aberration.blue, first.departure.aberration.blue, 3e-4);
 }
 
-// What is undone twice is undone by both.
+// Effects that are undone twice are undone by both.
 TEST(CameraDeparture, OneAfterAnotherIsBoth) {
   const CameraDeparture first{.aberration = {1.001, 0.999}, .exponent = 0.9},
       more{.aberration = {1.002, 1}, .exponent = 0.95};
@@ -135,7 +135,7 @@ TEST(CameraDeparture, OneAfterAnotherIsBoth) {
 }
 
 // So is one that an earlier frame showed: of a camera that is as the rig says, by what is seen through it; of one that
-// sharpens, whose channels are not asked where they lie, by a picture that looks better without.
+// sharpens, whose channels' places do not count, by an image that looks better without.
 TEST(CameraDeparture, IsWithdrawnWhereAFrameShowsItIsNone) {
   constexpr ChromaticAberration as_the_rig_says;
   for (std::uint64_t seed = 1; seed <= 6; ++seed) {
@@ -164,7 +164,7 @@ TEST(CameraDeparture, IsNoneBeyondWhatCamerasHave) {
   EXPECT_EQ(dark.then({.exponent = 1.4})->exponent, 1);
 }
 
-// What one frame tells of one kind says nothing of the other.
+// A frame's evidence of one kind says nothing of the other.
 TEST(CameraDeparture, DoubtOfBothKindsIsKept) {
   const CameraDeparture aberrated{.aberration = {1.001, 1}, .sigma_aberration = {1e-4, 0}, .doubt_of_radial = {1e-4}};
   const auto both = aberrated.then({.exponent = 0.85, .sigma_exponent = 0.01, .doubt_of_response_px = {0.03}});

@@ -5,7 +5,7 @@
 namespace lapservo::internal {
 namespace {
 
-// Of a picture that looks processed, or unlike any, through the departure.
+// For an image that looks processed, or unlike any, through the departure.
 bool looks_better(const ProcessingEvidence& as_the_rig_says, const ProcessingEvidence& departed) {
   if (as_the_rig_says.processing != Processing::found) return as_the_rig_says.processing == Processing::none;
   return !departed.edges || as_the_rig_says.edges->misfit_without < departed.edges->misfit_without;
@@ -51,7 +51,7 @@ SeenCamera look_at_camera(const LightImage& light, std::span<const Measurement> 
   if (more)
     look.add(*more, camera);
   else if (!known.any())
-    camera.departure = {};  // what was in doubt is not, where channels agree
+    camera.departure = {};  // what was uncertain is certain, where channels agree
   return camera;
 }
 

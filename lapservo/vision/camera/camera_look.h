@@ -9,8 +9,8 @@
 
 namespace lapservo::internal {
 
-/// What the camera did to a picture, as it looks when what is known of the camera is undone; and its departure from the
-/// rig's, as far as it is known then.
+/// The camera's processing of an image, as it looks when what is known of the camera is undone; and its departure from
+/// the rig's, as far as it is known then.
 struct SeenCamera {
   ProcessingEvidence evidence = {};
   CameraDeparture departure = {};
@@ -18,8 +18,8 @@ struct SeenCamera {
 };
 
 /// By the boundaries among `measurements`, which fit_step located with `blur_px` in what `light` is through the `known`
-/// departure. One is believed if the picture looks unprocessed without it: processing moves channels apart, too. One
-/// that an earlier frame showed is withdrawn by a picture that looks better with it in.
+/// departure. One is accepted if the image looks unprocessed without it: processing moves channels apart, too. One that
+/// an earlier frame showed is withdrawn by an image that looks better with it in.
 SeenCamera look_at_camera(const LightImage& light, std::span<const Measurement> measurements, double blur_px,
                           const CameraDeparture& known);
 

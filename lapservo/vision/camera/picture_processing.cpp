@@ -57,7 +57,7 @@ ProcessingVector sigmas_of_none() {
   sigmas[at(ProcessingUnknown::log_blur)] = 0.3;
   return sigmas;
 }
-// What is clipped hides its plateau, so that these are wide.
+// Clipped values hide their plateau, so that these are wide.
 EdgeVector edge_sigmas(const ExpectedPicture& picture) {
   EdgeVector sigmas = EdgeVector::Constant(0.3);
   sigmas[edge_gradient] = picture.gradient_sigma_per_px;
@@ -87,13 +87,13 @@ State expected_state(std::span<const PooledEdge> edges, double blur_px, double c
   return state;
 }
 
-// Of an edge's normal equations what concerns itself, and its part in the shared ones.
+// The part of an edge's normal equations that concerns itself, and its part in the shared ones.
 struct Block {
   Eigen::LLT<Eigen::Matrix<double, edge_unknowns, edge_unknowns>> factor;
   Eigen::Matrix<double, processing_unknowns, edge_unknowns> cross;
   EdgeVector gradient;
 };
-// An edge's normal equations: of the processing and of itself. What is expected of them is not in.
+// An edge's normal equations: of the processing and of itself. Expectations of them are not in.
 struct EdgeEquations {
   static constexpr int unknowns = processing_unknowns + edge_unknowns;
   Eigen::Matrix<double, unknowns, unknowns> square;
@@ -129,7 +129,7 @@ class Problem {
   }
   const State& prior() const { return prior_; }
 
-  // What is left of the values, of each boundary's mean over its levels of brightness: rms.
+  // The rest of the values, of each boundary's mean over its levels of brightness: rms.
   double misfit(const State& state) const {
     std::array<EdgeSamples, 4> sum, weight;
     sum.fill(EdgeSamples::Zero()), weight.fill(EdgeSamples::Zero());
@@ -146,7 +146,7 @@ class Problem {
       }
     return std::sqrt(static_cast<double>(squares / std::max(1.0F, values)));
   }
-  // Of the values and of what was expected, in sigmas.
+  // For the values and the expectations, in sigmas.
   double cost(const State& state) const {
     double sum = (state.processing - prior_.processing).cwiseAbs2().dot(certainty_);
     for (std::size_t k = 0; k < edges_.size(); ++k)
@@ -195,7 +195,7 @@ class Problem {
     return bounded(state.processing + information.llt().solve(gradient));
   }
   static constexpr double value_sigma = 0.0025;  // of one value: noise and what the model leaves out
-  // Of a place [px] and of a plateau: what is clipped tells of neither how far it goes on.
+  // Sigmas of a place [px] and of a plateau: clipped values show of neither how far it goes on.
   static constexpr double longest_step = 0.2;
 
   template <typename Function>
@@ -319,7 +319,7 @@ std::optional<ProcessedEdges> explain(const std::array<float, 256>& light_of_val
   const Problem without(light_of_value, all, blur_px, sigmas_of_none(), expected);
   const State none = minimised(without, without.prior());
   State state = minimised(problem, problem.prior());
-  // From where the picture is expected to be, the way to the least cost may end beside it.
+  // From where the image is expected to be, the way to the least cost may end beside it.
   if (problem.cost(none) < problem.cost(state)) state = minimised(problem, none);
   if (processing_of(state.processing).chroma_variance_px2 > processing_limits.chroma_variance_px2) {
     const Problem beside(light_of_value, all, blur_px, sigmas_beside(sigmas), expected);

@@ -9,7 +9,7 @@
 
 namespace lapservo::internal {
 
-/// When a camera's processing is believed.
+/// When a camera's processing counts.
 struct ProcessingLimits {
   /// By accuracy_study camera 12 3, 69 first guesses of 72 frames without any (none, bayer, ca, crosstalk, rec709,
   /// vignette) lie below these sizes, and of 60 with it (sharpen, chroma420, tone, camera, jpeg) none.
@@ -18,30 +18,29 @@ struct ProcessingLimits {
   /// Of a value, and of what is left without any processing: blood, highlights and noise are not explained by it (0.87
   /// and more), processing is (0.2 to 0.7).
   double max_misfit = 0.013, max_misfit_fraction = 0.8;
-  /// What no processing explains so well has none: 0.002 to 0.006 are left of rendered frames without any (a response
-  /// that is Rec. 709's and not the rig's among them, which saturation would explain, wrongly), 0.0035 and
-  /// more of those with some. What is taken for none by this is off by little, and sigma holds (0.3 to 0.9).
+  /// Images that no processing explains so well have none: 0.002 to 0.006 are left of rendered frames without any (a
+  /// response that is Rec. 709's and not the rig's among them, which saturation would explain, wrongly), 0.0035 and
+  /// more of those with some. Processing that is taken for none by this is small, and sigma holds (0.3 to 0.9).
   double max_misfit_of_none = 0.0048;
   int min_boundaries = 3;
 };
 inline constexpr ProcessingLimits processing_limits;
 
-/// What a picture is expected to be like before it is seen. Below 0 `least_sharpening` is a blur of luma after the
-/// response.
+/// Expectations of an image before it is seen. Below 0 `least_sharpening` is a blur of luma after the response.
 struct ExpectedPicture {
   double least_sharpening = -0.35;
   double gradient_sigma_per_px = 0.01;  ///< of the share by which light grows along a boundary's normal
   bool only_video = false;  ///< nothing but blurred colour differences: as demosaiced, as sharp, as colourful
 };
 
-/// What is to be known of a frame's processing for its boundaries' sake.
+/// The part of a frame's processing that matters to its boundaries.
 struct ProcessedEdges {
   PictureProcessing processing;
   std::array<std::optional<double>, 4> bias_px;  ///< by which fit_step mislocates each boundary that was seen well
   /// And each measurement of one, by those that are as bright: what the processing does to an edge goes by its light.
   std::array<float, EdgeMeasurements::most> measurement_bias_px{};
-  bool clips = false;         ///< colours beside a boundary lie beyond black or white: what shows of them tells less
-  double misfit = 0;          ///< rms of what the model leaves of the values
+  bool clips = false;  ///< colours beside a boundary lie beyond black or white: what is visible of them shows less
+  double misfit = 0;   ///< rms of what the model leaves of the values
   double misfit_without = 0;  ///< and of what one without any processing does
 };
 
@@ -52,8 +51,8 @@ bool is_processed(const PictureProcessing& processing);
 std::optional<PictureProcessing> first_guess(const std::array<float, 256>& light_of_value, const PooledEdges& edges,
                                              double blur_px);
 
-/// The likeliest processing, from what all boundaries look like; such as is expected.
-/// `blur_px` is what fit_step was told. Nullopt when too little was seen.
+/// The likeliest processing, from what all boundaries look like; such as is expected. `blur_px` is what fit_step was
+/// given. Nullopt when too little was seen.
 std::optional<ProcessedEdges> explain(const std::array<float, 256>& light_of_value, const PooledEdges& edges,
                                       double blur_px, const ExpectedPicture& expected = {});
 
@@ -63,7 +62,7 @@ bool is_believed(const ProcessedEdges& edges);
 /// How much each boundary may be mislocated: one that was not seen well by as much as the worst of the others.
 std::array<double, 4> bias_magnitudes_px(const ProcessedEdges& edges);
 
-/// Whether the camera did more to a picture than its response says. Unknown where the picture can't tell: blurred
+/// Whether the camera did more to an image than its response says. Unknown where the image can't show it: blurred
 /// widely, too little seen, or unlike any processing that is known here.
 enum class Processing { unknown, none, found };
 struct ProcessingEvidence {
@@ -72,11 +71,11 @@ struct ProcessingEvidence {
   bool explained = false;               ///< it took more than a first guess
 };
 
-/// Of the boundaries among `measurements`, which fit_step located with `blur_px`.
+/// For the boundaries among `measurements`, which fit_step located with `blur_px`.
 ProcessingEvidence find_processing(const LightImage& light, std::span<const Measurement> measurements, double blur_px,
                                    const ExpectedPicture& expected = {});
 
-/// What a first guess is made of; and the same by that of these measurements.
+/// The input of a first guess; and the same by that of these measurements.
 PooledEdges glance_at(const LightImage& light, std::span<const Measurement> measurements);
 ProcessingEvidence find_processing(const LightImage& light, std::span<const Measurement> measurements,
                                    const PooledEdges& glance, double blur_px, const ExpectedPicture& expected = {});

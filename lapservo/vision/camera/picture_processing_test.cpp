@@ -35,7 +35,7 @@ PooledEdge pooled(std::size_t boundary, const EdgeSamples& values, double locate
   return edge;
 }
 
-// Of boundaries at `offset_px` that were located at `located_px`, between inks that are darker by `shade`.
+// For boundaries at `offset_px` that were located at `located_px`, between inks that are darker by `shade`.
 PooledEdges edges_of(const PictureProcessing& processing, double offset_px, double located_px = 0, double shade = 1) {
   const ProcessingFilters filters(processing, false);
   PooledEdges edges;
@@ -77,7 +77,7 @@ TEST(PictureProcessing, IsToldFromTheBoundaries) {
   }
 }
 
-// Wherever fit_step located it; also where most of a channel is clipped, which tells saturation less well.
+// Wherever fit_step located it; also where most of a channel is clipped, which shows saturation less well.
 TEST(PictureProcessing, ABoundaryIsFoundWhereItIs) {
   for (const PictureProcessing& processing :
        {PictureProcessing{.blur_px = 1, .sharpening = 0.7}, PictureProcessing{.blur_px = 0.9, .chroma_variance_px2 = 1},
@@ -91,7 +91,7 @@ TEST(PictureProcessing, ABoundaryIsFoundWhereItIs) {
     }
 }
 
-// Of each brightness its own, as far as the processing moved that.
+// Each brightness has its own, as far as the processing moved that.
 TEST(PictureProcessing, MeasurementsAreCorrectedByThoseThatAreAsBright) {
   const PictureProcessing processing{.blur_px = 1, .saturation = 1.5};
   PooledEdges edges = edges_of(processing, 0, 0.1, 0.6);
@@ -142,7 +142,7 @@ TEST(PictureProcessing, ABoundaryThatWasNotSeenIsInDoubtByAsMuchAsTheWorst) {
   for (const std::size_t k : {0U, 1U, 3U}) EXPECT_LE(magnitudes_px[k], magnitudes_px[2]);
 }
 
-// Whatever the number of places located: as many as asked for, or all.
+// Whatever the number of places located: as many as wanted, or all.
 TEST(PooledEdges, TakesAsManyPlacesAsAskedFor) {
   const scenes::Shot& shot = scenes::usual_shot(1);
   constexpr int most = 12;
@@ -156,7 +156,7 @@ TEST(PooledEdges, TakesAsManyPlacesAsAskedFor) {
   }
 }
 
-// A picture that is bright on the right: a place is averaged with those that are as bright.
+// An image that is bright on the right: a place is averaged with those that are as bright.
 TEST(PooledEdges, AverageWhatIsAsBright) {
   cv::Mat bgr(60, 200, CV_8UC3, cv::Scalar(40, 60, 20));
   bgr(cv::Rect(100, 0, 100, 60)) = cv::Scalar(140, 160, 120);
@@ -178,7 +178,7 @@ TEST(PooledEdges, AverageWhatIsAsBright) {
   EXPECT_EQ(edges.of_measurement[20], PooledEdges::nowhere);
 }
 
-// What was located far from most places is something else, and moves none of them.
+// Edges that were located far from most places are something else, and move none of them.
 TEST(PooledEdges, LeaveOutWhatLiesElsewhere) {
   const scenes::Shot& shot = scenes::usual_shot(1);
   Measurement m{};
@@ -195,7 +195,7 @@ TEST(PooledEdges, LeaveOutWhatLiesElsewhere) {
   EXPECT_EQ(edges.of_measurement[4], PooledEdges::nowhere);
 }
 
-// What is linear exactly.
+// The exactly linear part.
 TEST(PooledEdges, SampleBetweenPixels) {
   cv::Mat bgr(40, 60, CV_8UC3);
   for (int v = 0; v < bgr.rows; ++v)
@@ -232,7 +232,7 @@ cv::Mat picture_of_step(const Eigen::Vector2d& middle_px, const Eigen::Vector2d&
   return bgr;
 }
 
-// What pixels show, sampled between them wherever the step lies among them: in the mean what the camera encodes there.
+// Values of pixels, sampled between them wherever the step lies among them: in the mean what the camera encodes there.
 TEST(PooledEdges, CubicSamplesHaveTheMeanOfWhatIsEncoded) {
   constexpr int phases = 8;
   for (const double angle_rad : {0.0, 0.4, 0.785}) {

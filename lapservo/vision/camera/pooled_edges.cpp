@@ -138,7 +138,7 @@ PooledEdge mean_of(std::span<const EdgePlace* const> places, std::span<const Mea
   return edge;
 }
 
-// What cubic convolution between pixels took away, in the mean over all places between them: of its kernel the second
+// The loss by cubic convolution between pixels, in the mean over all places between them: of its kernel the second
 // moment is 0, the fourth -0.3, and fourth differences have 24.
 void undo_cubic(PooledEdge& edge) {
   constexpr float fourth_moment = -0.3F;

@@ -11,8 +11,8 @@
 
 namespace lapservo::internal {
 
-/// What a frame shows across one boundary, averaged over places where it was located: encoded values (or light: Look)
-/// in [0, 1] along the boundary's normal, a pixel apart, sample `reach` where the pose has the boundary.
+/// A frame's values across one boundary, averaged over places where it was located: encoded values (or light: Look) in
+/// [0, 1] along the boundary's normal, a pixel apart, sample `reach` where the pose has the boundary.
 struct PooledEdge {
   static constexpr int reach = 6, samples = 2 * reach + 1;
   std::size_t boundary = 0;                           ///< 0 to 3
@@ -22,7 +22,7 @@ struct PooledEdge {
   double residual_px = 0;                        ///< where the places were located, from where the pose has them: mean
   int clear_px = reach;  ///< so far on either side no other boundary shows, wherever it was located
 
-  /// Of fewer places it shows more noise than shape.
+  /// With fewer places it shows more noise than shape.
   static constexpr int min_places = 8, least_clear_px = 3;
   bool is_seen() const { return places >= min_places && clear_px >= least_clear_px; }
 };
@@ -32,16 +32,16 @@ struct PooledEdge {
 inline constexpr int max_brightness_levels = 4;
 struct PooledEdges {
   InplaceVector<PooledEdge, 4 * max_brightness_levels> all;
-  /// Of each measurement, at which of `all` it was averaged.
+  /// For each measurement, at which of `all` it was averaged.
   static constexpr std::uint8_t nowhere = 255;
   std::array<std::uint8_t, EdgeMeasurements::most> of_measurement;
 
   PooledEdges() { of_measurement.fill(nowhere); }
 };
 
-/// What is taken between pixels, and averaged: encoded values, along straight lines or cubic (the former darken what is
-/// bright beside an edge, where encoded light bends, for an eighth of the time); or light along straight lines, as
-/// fit_step does, which averages without a bias but is no value that a camera's filters worked on.
+/// The values that are taken between pixels, and averaged: encoded values, along straight lines or cubic (the former
+/// darken what is bright beside an edge, where encoded light bends, for an eighth of the time); or light along straight
+/// lines, as fit_step does, which averages without a bias but is no value that a camera's filters worked on.
 enum class Between { values, values_cubic, light };
 
 /// How closely boundaries are looked at: at most so many places of each, in at most so many levels of brightness.
@@ -51,7 +51,7 @@ struct Look {
   Between between;
 };
 
-/// Of the boundaries among `measurements`.
+/// For the boundaries among `measurements`.
 PooledEdges pool_edges(const LightImage& light, std::span<const Measurement> measurements, const Look& look);
 
 }  // namespace lapservo::internal

@@ -10,7 +10,7 @@
 
 namespace lapservo::internal {
 
-/// What a camera does to a picture, the same everywhere in a frame, in this order.
+/// A camera's processing of an image, the same everywhere in a frame, in this order.
 struct PictureProcessing {
   double blur_px = 1;              ///< of the light
   double log_mosaic = 0;           ///< log of how much wider red and blue light is blurred than green: demosaicing
@@ -42,7 +42,7 @@ PictureProcessing processing_of(const ProcessingVector& unknowns);
 using EdgeVector = Eigen::Matrix<double, 8, 1>;
 inline constexpr int edge_unknowns = EdgeVector::RowsAtCompileTime;
 inline constexpr int edge_offset = 0, edge_before = 1, edge_after = 4, edge_gradient = 7;
-/// Of encoded b, g, r as they are before `processing`.
+/// For encoded b, g, r as they are before `processing`.
 EdgeVector edge_of(const PictureProcessing& processing, const Eigen::Vector3d& before, const Eigen::Vector3d& after,
                    double offset_px);
 
@@ -56,7 +56,7 @@ inline constexpr int filter_reach = 4, both_filters_reach = 2 * filter_reach;
 using Filter = std::array<double, filter_reach + 1>;
 using BothFilters = std::array<double, both_filters_reach + 1>;
 
-/// What the processing does to encoded luma and to colour differences, and with `derivatives` how that changes.
+/// The effect of the processing on encoded luma and on colour differences, and with `derivatives` how that changes.
 struct ProcessingFilters {
   Filter luma, luma_by_sharpening, luma_by_radius;
   BothFilters chroma, chroma_by_sharpening, chroma_by_radius, chroma_by_variance;
@@ -64,7 +64,7 @@ struct ProcessingFilters {
   ProcessingFilters(const PictureProcessing& processing, bool derivatives);
 };
 
-/// What a camera shows of a step of light.
+/// A camera's image of a step of light.
 class ProcessedEdge {
  public:
   explicit ProcessedEdge(const std::array<float, 256>& light_of_value) : light_of_value_(light_of_value) {}
@@ -83,9 +83,9 @@ class ProcessedEdge {
   const std::array<float, 256>& light_of_value_;
 };
 
-/// Light along a line, a pixel apart, as it looks after blurred colour differences in their place and sharpening. What
-/// is even stays as it is, so light is as the camera shows it: `saturation` has been at work. `luma` is the same
-/// without colour differences: what a grey picture made of it shows, in all channels alike.
+/// Light along a line, a pixel apart, as it looks after blurred colour differences in their place and sharpening. Light
+/// that does not vary stays as it is, so light is as the camera shows it: `saturation` has been at work. `luma` is the
+/// same without colour differences: what a grey image of it shows, in all channels alike.
 struct FilteredLight {
   std::vector<std::array<double, 3>> light;
   std::vector<double> luma;

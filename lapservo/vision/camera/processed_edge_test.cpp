@@ -54,7 +54,7 @@ TEST(ProcessedEdge, DerivativesAreThoseOfTheValues) {
   }
 }
 
-// What saturation does to even light is in what is shown, so a change of it moves no plateau.
+// The effect of saturation on constant light is in what is shown, so a change of it moves no plateau.
 TEST(ProcessedEdge, PlateausAreAsShown) {
   ProcessingVector unknowns = everything();
   EdgeVector edge;

@@ -18,7 +18,7 @@ struct Blob {
   int grid_px = 0;  ///< distance of neighbouring samples
 };
 
-/// Of a blob, on a grid of 8 px: smaller ones leave too few boundaries for a fit.
+/// A blob's size on a grid of 8 px: smaller ones leave too few boundaries for a fit.
 inline constexpr int min_blob_samples = 8;
 
 /// All groups of coloured samples of at least `min_samples`, largest first. Touches one pixel in grid_px^2 only.

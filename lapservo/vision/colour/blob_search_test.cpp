@@ -152,7 +152,7 @@ TEST(BlobSearch, FindsNothingInTissue) {
   }
 }
 
-// A borrowed part of a larger picture: rows are not contiguous.
+// A borrowed part of a larger image: rows are not contiguous.
 TEST(BlobSearch, LooksAtTheGivenPartOnly) {
   cv::Mat image = blank();
   Strip{{300, 240}, 0.3, 200, 60}.paint(image);

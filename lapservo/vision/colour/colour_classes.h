@@ -34,7 +34,7 @@ class ColourClasses {
   explicit ColourClasses(const std::vector<Instrument>& instruments);
 
   std::uint8_t operator()(const std::uint8_t* bgr) const { return table_[index(bgr)]; }
-  /// Of pixels that lie `step_bytes` apart, as many as `classes` has places.
+  /// For pixels that lie `step_bytes` apart, as many as `classes` has places.
   void classify(const std::uint8_t* bgr, std::ptrdiff_t step_bytes, std::span<std::uint8_t> classes) const {
     const std::uint8_t* table = table_.data();  // a local: bytes written could be anything's
     for (std::uint8_t& out : classes) out = table[index(bgr)], bgr += step_bytes;

@@ -78,8 +78,8 @@ cv::Mat render_moving(const Shot& shot, const Eigen::Vector2d& along_and_across_
       .render_exposure(scenes::moving_exposure(shot.rig, shot.q, {.along_and_across_px = along_and_across_px}), 1);
 }
 
-// What else psi is off by (the film's thickness) is alike for two motions that are mirrored at the shaft: only what the
-// fit makes of their direction tells them apart.
+// Psi's other error (the film's thickness) is alike for two motions that are mirrored at the shaft: only what the fit
+// makes of their direction separates them.
 TEST(BlurredBoundary, PsiDoesNotFollowMotionObliqueToTheShaft) {
   constexpr int shots = 3;
   double apart_rad = 0;

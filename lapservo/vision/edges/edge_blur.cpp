@@ -8,7 +8,7 @@
 namespace lapservo::internal {
 namespace {
 
-// Of a motion that blurs beyond what a lens does.
+// For a motion that blurs beyond what a lens does.
 double motion_px(double blur_px) {
   return std::sqrt(std::max(0.0, blur_px * blur_px - blur_limits.lens_blur_px * blur_limits.lens_blur_px));
 }
@@ -39,7 +39,7 @@ double BlurEvidence::improved(double blur_px) const {
 
 void EllipseEvidence::add(const EdgeFit& edge, double variance, const EdgeBlur& blur, std::size_t boundary,
                           const Eigen::Vector2d& normal) {
-  // Of the blur along the line, whose square is the ellipse's form of (1, tangent).
+  // The blur along the line, whose square is the ellipse's form of (1, tangent).
   const double tangent = normal.y() / normal.x();
   const double line_px = blur.ellipse(boundary).along_normal_px({1, tangent});
   Numbers row = Numbers::Zero();
@@ -50,7 +50,7 @@ void EllipseEvidence::add(const EdgeFit& edge, double variance, const EdgeBlur& 
 }
 
 EllipseEvidence::Equations EllipseEvidence::with_prior(const EdgeBlur& blur) const {
-  // What is not seen is taken to be as the others, and the correlation to be none.
+  // Blur that is not seen is taken to be as the others', and the correlation to be none.
   const double mean_px = blur.boundaries_px();
   Equations equations{information_, gradient_};
   equations.information.diagonal().array() += 1;

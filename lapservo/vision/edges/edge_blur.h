@@ -9,14 +9,14 @@
 
 namespace lapservo::internal {
 
-/// Of a lens in usual pictures, one sigma; what is beyond is motion's or defocus'.
+/// A lens's in usual images, one sigma; the rest is motion's or defocus'.
 inline constexpr double usual_blur_px = 1.2;
 
 struct BlurLimits {
-  /// The sharpest lens's. What a lens blurs beyond it makes the correlation smaller, which is fitted; nothing makes it
+  /// The sharpest lens's. A lens's blur beyond it makes the correlation smaller, which is fitted; nothing makes it
   /// larger than 1.
   double lens_blur_px = 0.8;
-  /// Of a blur, and by how much a pass may change it: wider is no edge, and far steps overshoot.
+  /// Limits of a blur, and by how much a pass may change it: wider is no edge, and far steps overshoot.
   double min_blur_px = 0.5, max_blur_px = 8, min_blur_change = 0.6, max_blur_change = 1.7;
 };
 inline constexpr BlurLimits blur_limits;
@@ -48,7 +48,7 @@ struct EdgeBlur {
   BlurEllipse ellipse(std::size_t boundary) const;
 };
 
-/// What edges say about one width of the blur.
+/// Evidence of edges about one width of the blur.
 struct BlurEvidence {
   double gradient = 0, information = 0;
   void add(const EdgeFit& edge, double variance) {
@@ -59,7 +59,7 @@ struct BlurEvidence {
   double improved(double blur_px) const;
 };
 
-/// What the boundaries say about the blur: they are not all inclined alike.
+/// Evidence of the boundaries about the blur: they are not all inclined alike.
 class EllipseEvidence {
  public:
   /// A point of a boundary that was located along the shaft with this blur, its normal's parts along the shaft and

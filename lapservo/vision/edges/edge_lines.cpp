@@ -8,8 +8,8 @@
 
 #include "lapservo/vision/edges/blurred_edges.h"
 
-// What follows up to HWY_ONCE is compiled once for every instruction set that differs much from the others and whose
-// vectors may stand in arrays.
+// All up to HWY_ONCE is compiled once for every instruction set that differs much from the others and whose vectors may
+// stand in arrays.
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "lapservo/vision/edges/edge_lines.cpp"
@@ -288,7 +288,7 @@ struct Basis {
     for (std::size_t s = 0; s < Shapes; ++s) out[s] = &columns[s];
     return out;
   }
-  // Of the product of two derivatives, what the basis can't imitate.
+  // The part of the product of two derivatives that the basis can't imitate.
   static V left_of(V product, const std::array<V, linear>& a, const std::array<V, linear>& b) {
     for (std::size_t j = 0; j < linear; ++j) product = hn::NegMulAdd(a[j], b[j], product);
     return product;
@@ -314,7 +314,7 @@ struct FitLanes {
   Mask converged;
 };
 
-// What a line shows: light by channel, and the sums of its squares.
+// A line's values: light by channel, and the sums of its squares.
 struct LineLight {
   const std::array<Column, 3>& light;
   V squares;
@@ -373,7 +373,7 @@ FitLanes project(const LineLanes& lines, const LineLight& seen, const Column& pr
   const V degrees =
       hn::MulAdd(hn::Set(d, 3), hn::Sub(samples_of(lines), hn::Set(d, static_cast<float>(linear))), hn::Set(d, -1));
   fit.offset = hn::Div(position_gradient, fit.information);
-  // Of the blur, whatever the position is.
+  // For the blur, whatever the position is.
   fit.blur_gradient = hn::NegMulAdd(fit.offset, position_and_blur, fit.blur_gradient);
   fit.blur_information =
       hn::NegMulAdd(hn::Div(position_and_blur, fit.information), position_and_blur, fit.blur_information);

@@ -39,7 +39,7 @@ cv::Mat picture(bool contour, std::uint64_t seed, int spots = 0) {
   return image;
 }
 
-// Of all directions and lengths, across the edge; some up to the image's border.
+// In all directions and lengths, across the edge; some up to the image's border.
 std::vector<EdgeLine> random_lines(std::size_t count, bool contour, std::uint64_t seed) {
   Random random(seed);
   std::vector<EdgeLine> lines;

@@ -24,7 +24,7 @@ struct Generatrix {
   Eigen::Vector3d outwards_unrolled, outwards, around, begin;
 };
 
-// What a pass measures with.
+// The tools of a pass.
 struct Frame {
   const Scene& scene;
   const LightImage& light;
@@ -244,7 +244,7 @@ double even_light_in(std::span<const BoundaryPlace> places, std::span<const Edge
   for (const std::size_t k : {1U, 2U}) {
     const LocatedSteps steps(k, places, edges);
     InplaceVector<FadingPoint, max_lines> points;
-    for (std::size_t at = 0; at < steps.points.size(); at += 2) {  // half of them tell enough
+    for (std::size_t at = 0; at < steps.points.size(); at += 2) {  // half of them suffice
       const std::size_t i = steps.points[at];
       points.push_back({places[i].facing.outside, dot(edges[i].step, steps.sum)});
     }
@@ -253,7 +253,7 @@ double even_light_in(std::span<const BoundaryPlace> places, std::span<const Edge
   return usual_or_seen(seen);
 }
 
-// Tells from the located points of an end how far the film's edge, where it shows, moves them.
+// Measures from the located points of an end how far the film's edge, where it shows, moves them.
 void see_film(const Frame& frame, std::size_t k, double even_light, const EdgeBlur& blur,
               std::span<BoundaryPlace> places, std::span<const EdgeFit> edges) {
   const LocatedSteps steps(k, places, edges);
@@ -274,7 +274,7 @@ void see_film(const Frame& frame, std::size_t k, double even_light, const EdgeBl
     Measurement& m = place.measurement;
     m.row[film_unknown] += (shift.by_width - place.film_shift) * film_sigma_m * place.film_px_per_m;
     place.film_moved_px = shift_px - place.film_shift * width_px;
-    // What gloss takes off is no better known.
+    // The correction for specular light is no better known.
     const double doubted_px = std::max(std::abs(shift_px), std::abs(matt * width_px));
     place.film_sigma_px = edge_limits.film_doubt * doubted_px * doubted_px / blur_px;
     m.expected_px += static_cast<float>(place.film_moved_px) * m.normal;
@@ -326,7 +326,7 @@ void trust(std::span<const Candidate> candidates, const EdgeBlur& blur, EdgeMeas
   }
 }
 
-// Of the visible half width: blur mixes what lies beside the shaft into what is near its sides.
+// As a part of the visible half width: blur mixes what lies beside the shaft into what is near its sides.
 double line_reach(const EdgeBlur& blur, double radius_px) {
   return std::clamp(1 - edge_limits.blurs_from_side * blur.sides_px / radius_px, edge_limits.least_line_reach,
                     edge_limits.line_reach);

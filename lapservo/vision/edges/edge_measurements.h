@@ -64,7 +64,7 @@ struct Measurement {
 inline constexpr std::size_t measurement_groups = 6;
 
 /// How far beyond the blur a pass looks for boundaries and for sides, how often it refines each before the pose, and
-/// which fraction of the generatrices and stations it uses: one of so many. What lies beside the shaft is less even
+/// which fraction of the generatrices and stations it uses: one of so many. Surroundings of the shaft are less even
 /// than its bands: where a side's place is known to a pixel, 2 px beyond the blur make its error half as large again.
 struct Effort {
   double extra_px, extra_of_sides_px;

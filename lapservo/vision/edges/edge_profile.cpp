@@ -141,7 +141,7 @@ EdgeFit project(const EdgeProfile& profile, const Basis<Shapes>& basis) {
     if (const auto channel = fit_channel(profile, basis, c)) add_channel(profile, basis, c, *channel, fit, sums);
   if (sums.degrees < 3 || !(fit.information > min_edge_information)) return fit;
   fit.offset_px = sums.position_gradient / fit.information;
-  // Of the blur, whatever the position is.
+  // For the blur, whatever the position is.
   fit.blur_gradient -= fit.offset_px * sums.position_and_blur;
   fit.blur_information -= sums.position_and_blur * sums.position_and_blur / fit.information;
   fit.residual_variance = sums.squares / static_cast<float>(sums.degrees);

@@ -17,7 +17,7 @@ struct FadingLine {
   double off(const FadingPoint& p) const { return p.step - at_zero - slope * p.outside_facing; }
 };
 
-// Of the points within three sigma of the line before.
+// For the points within three sigma of the line before.
 FadingLine fading_line(std::span<const FadingPoint> points, const FadingLine& before) {
   constexpr double inlier_variances = 9, least_spread = 1e-6;
   double x = 0, y = 0, xx = 0, xy = 0, yy = 0;

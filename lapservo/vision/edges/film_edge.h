@@ -11,20 +11,20 @@ namespace lapservo::internal {
 /// The light on the film's edge and beside it.
 struct FilmEdgeLimits {
   /// Light on the film's edge, by that on the outside at most: the even fraction (the rest is diffuse, from the
-  /// camera), what is usual and one sigma of it; one sigma of what a boundary tells of it (lamps fade with the
+  /// camera), what is usual and one sigma of it; one sigma of what a boundary shows of it (lamps fade with the
   /// distance, and no paper is quite matt), from so many points on.
   double most_lit = 3, usual_even_light = 0.1, even_light_sigma = 0.07, most_even_light = 0.4;
   double told_even_light_sigma = 0.03;
   std::size_t min_fading_points = 8;
-  /// Light of the bare shaft by the step of light at an end, gloss and veils aside: black plastic reflects 2 to 5 %, a
-  /// print's bright channels half. And the gloss there that is believed.
+  /// Light of the bare shaft by the step of light at an end, without specular light and veils: black plastic reflects 2
+  /// to 5 %, a print's bright channels half. And the specular light there that counts.
   double bare_shaft_light = 0.04, most_gloss = 0.6;
 };
 inline constexpr FilmEdgeLimits film_edge_limits;
 
 /// The cut edge of the film that carries the marker, between the bare shaft and the outside of the print: where an end
 /// is seen from beyond it shows, as a strip of its own brightness. The end is located between the strip's two borders,
-/// or a little off them, by how bright it is; all of it is told from the frame but the film's thickness.
+/// or a little off them, by how bright it is; all of it is measured in the frame but the film's thickness.
 
 /// How much the outside and, at an end, the film's edge face the camera (cosines); 0 of an edge that is not seen.
 struct Facing {
@@ -37,25 +37,27 @@ struct FadingPoint {
 };
 
 /// The even part of the light on the shaft, from how the change of light over an inner boundary fades towards the
-/// sides, and 1/sigma^2. Both sides of it have the same gloss, so gloss does not count. No certainty: too few points.
+/// sides, and 1/sigma^2. Both sides of it have the same specular light, which therefore does not count. No certainty:
+/// too few points.
 struct EvenLight {
   double fraction = 0, certainty = 0;
 };
 EvenLight even_light_of(std::span<const FadingPoint> points);
-/// Of those of several boundaries, with what is usual.
+/// For those of several boundaries, with what is usual.
 double usual_or_seen(std::span<const EvenLight> seen);
 
-/// Where the film's edge lies between the bare shaft (0) and the outside beside it (1) by its light, without gloss.
+/// Where the film's edge lies between the bare shaft (0) and the outside beside it (1) by its light, without specular
+/// light.
 double film_edge_level(const Facing& facing, double even_light);
 
-/// What is seen at a point of an end, along the end's own change of light: bare shaft, and the step up to the outside.
+/// The values at a point of an end, along the end's own change of light: bare shaft, and the step up to the outside.
 struct EndPoint {
   float shaft, step;
 };
 inline constexpr std::size_t max_end_points = 64;
-/// Gloss on the bare shaft beside each point, by the step there: what the shaft, which is black, has more of than most
-/// of the end, as what all of it has veils the picture. It is the outside's, too, but not that of the film's edge,
-/// which faces elsewhere and lies lower by as much.
+/// Specular light on the bare shaft beside each point, by the step there: what the shaft, which is black, has more of
+/// than most of the end, as what all of it has veils the image. It is the outside's, too, but not that of the film's
+/// edge, which faces elsewhere and lies lower by as much.
 InplaceVector<double, max_end_points> gloss_of(std::span<const EndPoint> points);
 
 /// By what fraction of the film's projected width an end is moved inwards whose film's edge has this level, and

@@ -40,7 +40,7 @@ TEST(EvenLight, IsTheUsualWhereNothingTells) {
   EXPECT_NEAR(usual_or_seen(std::array{even_light_of(fading(0.3, 0.3, 9))}), usual, 0.06);
 }
 
-// What is rendered matt: a level that the gloss does not touch; half of it in even light.
+// Rendered matt surfaces: a level that specular light does not touch; half of it in ambient light.
 TEST(FilmEdge, IsAsBrightAsItFacesTheLight) {
   EXPECT_NEAR(film_edge_level({0.8, 0.8}, 0), 1, 1e-9);
   EXPECT_NEAR(film_edge_level({0.8, 0.3}, 1), 1, 1e-9);

@@ -14,7 +14,7 @@ namespace lapservo::internal {
 namespace {
 
 constexpr int taps = 4, chunk_px = 16, channels = 3;
-// Levels of 255. What noise leaves no doubt about shows at the low one; through strong noise, at the high one.
+// Levels of 255. Fields show at the low one without noise; through strong noise, at the high one.
 constexpr std::uint8_t sampled_gap = 20, low_gap = 6, high_gap = 24;
 
 // By how much both values of one parity exceed both of the other; 0 when they do not. In bytes throughout: the compiler
@@ -37,7 +37,7 @@ int count_alternating(const std::uint8_t* a, const std::uint8_t* b, const std::u
   return count;
 }
 
-// Of a fraction of the box's bytes, chunks spread over all its rows and columns.
+// A fraction of the box's bytes: chunks spread over all its rows and columns.
 Alternation sampled_alternation(const ImageView& image, const PixelBox& box) {
   constexpr int max_pixels = 2500, stagger = 5, bytes = channels * chunk_px;
   const int width_px = box.u_end - box.u_begin, height_px = box.v_end - box.v_begin;
@@ -138,8 +138,8 @@ Alternation luma_alternation(const ImageView& image, const PixelBox& box, std::u
   return sum;
 }
 
-// What frames without fields stay below: chroma subsampling (4:2:2) of strong noise 0.6 and 0.1, of a sharp picture 0.2
-// and 0.25. Fields 3 px apart across the shaft exceed it, 5 px along it, 10 px about it.
+// Limits that frames without fields stay below: chroma subsampling (4:2:2) of strong noise 0.6 and 0.1, of a sharp
+// image 0.2 and 0.25. Fields 3 px apart across the shaft exceed it, 5 px along it, 10 px about it.
 bool is_combed(const ImageView& image, const PixelBox& box) {
   constexpr double min_per_px = 0.25, min_ratio = 0.3;
   if (!is_suspicious(image, box)) return false;

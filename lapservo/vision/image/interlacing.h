@@ -30,7 +30,7 @@ struct Alternation {
 Alternation luma_alternation(const ImageView& image, const PixelBox& box, std::uint8_t min_gap);
 
 /// Whether two fields are woven in the box that saw something in two places, some pixels apart. Looks at some thousand
-/// pixels, and at all only where those look suspicious. Allocates nothing.
+/// pixels, and at all only where those look like fields. Allocates nothing.
 bool is_combed(const ImageView& image, const PixelBox& box);
 
 /// Whether it is so about what was found, or refused, as the marker; false where nothing was.
@@ -42,7 +42,7 @@ class EvenField {
   /// Light is interpolated, as the lens blurs it; means of encoded values would shift edges towards the brighter side.
   explicit EvenField(const Response& response);
 
-  /// `frame_bgr`: 8-bit, 3 channels. What it gives lives until the next call; allocates when the size changes.
+  /// `frame_bgr`: 8-bit, 3 channels. Its result lives until the next call; allocates when the size changes.
   const cv::Mat& of(const cv::Mat& frame_bgr);
 
  private:

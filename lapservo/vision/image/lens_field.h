@@ -20,7 +20,7 @@ class LensField {
     const double widest = beyond_corner * std::tan(half_field_rad(camera));
     widest_squared_ = widest * widest;
   }
-  /// Of a point in the camera's frame, or of a ray to it.
+  /// For a point in the camera's frame, or a ray to it.
   bool contains(const Eigen::Vector3d& point) const {
     constexpr double nearest = 1e-3;
     return point.z() > nearest && point.head<2>().squaredNorm() < widest_squared_ * point.z() * point.z();

@@ -80,8 +80,8 @@ TEST(LightImage, IsSaturatedWhereverASaturatedPixelHasAShare) {
     }
 }
 
-// A part of a larger picture that is saturated all around: where contains() says yes, nothing of that is read. Also
-// for places so near the border that they round onto it.
+// A part of a larger image that is saturated all around: where contains() says yes, nothing of that is read. Also for
+// places so near the border that they round onto it.
 TEST(LightImage, ReadsNothingOutsideOfWhatItContains) {
   for (const int width_px : {16, 641, 1921}) {
     cv::Mat large(24, width_px + 4, CV_8UC3, cv::Scalar::all(255));

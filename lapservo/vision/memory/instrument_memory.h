@@ -11,7 +11,7 @@
 
 namespace lapservo::internal {
 
-/// What is remembered of an instrument that was found in the frame before. Times are FrameClock's.
+/// The memory of an instrument that was found in the frame before. Times are FrameClock's.
 struct InstrumentMemory {
   double time_s;
   PoseUnknowns last;

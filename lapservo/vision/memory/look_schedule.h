@@ -6,10 +6,10 @@
 
 namespace lapservo::internal {
 
-/// In which of a followed marker's frames to look at what the camera did to the picture (camera_look.h). A camera that
-/// processes its pictures is looked at in each frame, since what to take off depends on the frame. One that does not is
-/// looked at now and then, and where the blur changes (Expected). A full look that stays without an answer
-/// costs several times a tracked frame, and the next frame rarely differs: it is repeated after 1, 2, 4, ... frames.
+/// In which of a followed marker's frames to look at what the camera did to the image (camera_look.h). A camera that
+/// processes its images is looked at in each frame, since what to take off depends on the frame. One that does not is
+/// looked at now and then, and where the blur changes (Expected). A full look that stays without an answer costs
+/// several times a tracked frame, and the next frame rarely differs: it is repeated after 1, 2, 4, ... frames.
 class LookSchedule {
  public:
   bool is_due() const { return frames_left_ == 0; }

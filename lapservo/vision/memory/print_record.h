@@ -9,7 +9,7 @@
 
 namespace lapservo::internal {
 
-/// What frames of a run tell of a print.
+/// The evidence of a run's frames about a print.
 struct PrintRecordLimits {
   double wholly_located = 0.8,
          most_p_false = 1e-4;  ///< the rig's: all boundaries on so many lines, psi so rarely wrong
@@ -23,11 +23,11 @@ inline constexpr PrintRecordLimits print_record_limits;
 /// Whether a frame showed that the print is the rig's, as far as psi goes: wholly seen, and hardly ever wrong.
 bool shows_the_rigs_print(const FineFit& fit);
 
-/// What a run's frames showed of one instrument's print, from each side. A print that is off looks like the rig's, but
-/// turned, from few sides; and where blood hides an inner boundary a single frame can't tell.
+/// The evidence of a run's frames about one instrument's print, from each side. A misprint looks like the rig's, but
+/// turned, from few sides; and where blood hides an inner boundary a single frame can't show it.
 class PrintRecord {
  public:
-  /// `possible`: nothing speaks against the rig's print, but the frame could not tell.
+  /// `possible`: nothing speaks against the rig's print, but the frame could not show it.
   enum class View : std::uint8_t { unseen, possible, the_rigs, off };
 
   /// Before each frame; times are FrameClock's. Forgets a print of which nothing was added for so long that it may be

@@ -75,7 +75,7 @@ TEST(PrintRecord, APictureThatCanNotTellIsNoNews) {
   record.add(1, View::the_rigs), record.add(1.6, View::the_rigs);
   for (const double tau_rad : {1.0, 1.6, 2.2}) record.add(tau_rad, View::possible);
   EXPECT_TRUE(is_the_rigs(record, 1.3));
-  EXPECT_FALSE(is_the_rigs(record, 2.8)) << "near what could not tell, and one other";
+  EXPECT_FALSE(is_the_rigs(record, 2.8)) << "near what could not show it, and one other";
 }
 
 }  // namespace print_record_test

@@ -21,7 +21,7 @@ double median_sigma_px(std::span<const Measurement> measurements) {
   return sigmas_px.empty() ? 0 : median(sigmas_px);
 }
 
-// Of a blur, what is beyond the usual.
+// The part of a blur beyond the usual.
 double beyond_px2(double blur_px, double usual_px) {
   return std::max(0.0, blur_px * blur_px - usual_px * usual_px);
 }
@@ -58,7 +58,7 @@ void add_patterns(const EdgeBlur& blur, double radius_px, double moved_px, Commo
   errors.bowed_px = usual.bowed_fraction_of_processing * moved_px;
 }
 
-// `moved_px`: by the camera's processing, root mean square of the boundaries; so much of it is doubted.
+// `moved_px`: by the camera's processing, root mean square of the boundaries; so much of it is uncertain.
 PrintDoubt doubt_of(double sigma_px, const EdgeBlur& blur, double radius_px, double moved_px,
                     double doubted_of_processing) {
   const double beyond_usual_px = std::max(0.0, sigma_px - usual.usual_sigma_px), blur_px = beyond_usual_blur_px(blur);
@@ -93,7 +93,7 @@ CommonErrors common_errors(const EdgeMeasurements& pass, const ResidualLines& li
   add_patterns(blur, pass.radius_px, moved_px, errors);
   const double scatter = scatter_sigmas(pass.all, lines), sigma_px = median_sigma_px(pass.all);
   errors.boundary_noise_scale = std::max(usual.least_noise_scale, scatter);
-  // What scatters points beyond their noise moves whole boundaries and sides, too.
+  // Causes that scatter points beyond their noise move whole boundaries and sides, too.
   const double unmodelled = std::max(1.0, scatter);
   for (double& error_px : errors.px) error_px *= unmodelled;
   for (double* error_px : {&errors.whole_px, &errors.leaning_px, &errors.bowed_px}) *error_px *= unmodelled;

@@ -13,35 +13,36 @@
 
 namespace lapservo::internal {
 
-/// How large the errors are that measurements share, and what is doubted of a picture. Fractions are of pixels.
+/// How large the errors are that measurements share, and what is uncertain in an image. Fractions are of pixels.
 struct UsualErrors {
-  /// What the model leaves out of each boundary as a whole (px, times the blur's square by the shaft's radius: shading
-  /// across the blur) and of each side: it does not average over lines. `accuracy_study edges` measures it.
+  /// The model's error of each boundary as a whole (px, times the blur's square by the shaft's radius: shading across
+  /// the blur) and of each side: it does not average over lines. `accuracy_study edges` measures it.
   double boundary_of_blur = 0.12, common_side_px = 0.02;
   /// And as a fraction of the blur beyond the usual: defocus and motion do not blur like a Gaussian. All boundaries
   /// move together by more, mostly where the light comes from aside.
   double common_fraction_of_blur = 0.008, whole_fraction_of_blur = 0.02;
   /// And of the blur's square beyond a lens's, by the shaft's radius: how far sides, which are no steps, are off, and
-  /// by how much all boundaries lean alike, which is what the model of it (blurred_boundary.h) leaves. Of sharp
-  /// pictures sides have a blur of usual_side_blur_px.
+  /// by how much all boundaries lean alike, which is what the model of it (blurred_boundary.h) leaves. Sides of sharp
+  /// images have a blur of usual_side_blur_px.
   double usual_side_blur_px = 1.05, side_of_blur = 1.4, leaning_of_blur = 0.035;
   /// And as a fraction of what the camera's processing moves a boundary by, which is known so well; where colours are
   /// clipped beside boundaries, the larger one. A processing that moves them by doubted_processing_px (rms) doubles the
   /// noise that `calibrate marker` takes.
   double fraction_of_processing = 0.13, fraction_of_clipped = 0.3, doubted_processing_px = 0.1;
   /// By so much of it (rms) sides are off, too, and what is left of all boundaries is moved, leaning and bowed alike,
-  /// of which psi feels little: without, phi had up to 2.5 of its sigmas in pictures with 4:2:0, and theta 2.2.
+  /// of which psi feels little: without, phi had up to 2.5 of its sigmas in images with 4:2:0, and theta 2.2.
   double side_fraction_of_processing = 0.5, whole_fraction_of_processing = 0.4, leaning_fraction_of_processing = 0.1,
          bowed_fraction_of_processing = 0.3;
-  /// And what of that is doubted before the print is blamed: of exact prints 0 to 0.1 px of 0.3 to 0.7 px are left.
+  /// And the part of that which is uncertain before the print is blamed: of exact prints 0 to 0.1 px of 0.3 to 0.7 px
+  /// are left.
   double doubted_of_processing = 0.12;
-  /// What even that does not explain of a value, beyond the usual: 0.012 moved boundaries by 0.1 px.
+  /// The rest of a value that even that does not explain, beyond the usual: 0.012 moved boundaries by 0.1 px.
   double usual_misfit = 0.004, px_per_misfit = 8;
   /// Noise is as the scatter about the fit shows it, but no less than this part of what measurements say.
   double least_noise_scale = 0.5;
   double usual_sigma_px = 0.05;  ///< of an edge; compressed ones (--format jpg) have three times that
 
-  /// What is doubted before the print is blamed (PrintDoubt): by what is beyond the usual sigma of an edge, by the blur
+  /// Uncertainty before the print is blamed (PrintDoubt): by what is beyond the usual sigma of an edge, by the blur
   /// beyond a lens's and by what the processing moved. Residuals of exact prints, each about the pose: boundaries 0.03
   /// px in JPEG, 0.09 in H.264, 0.007 in defocus (2 to 3.2 px); their tilts 0.03, 0.08, 0.05; the marker looks shorter
   /// by 0.5 % in defocus. In the dark and in noise nothing is left of it.
@@ -50,16 +51,16 @@ struct UsualErrors {
   /// radius.
   double doubted_boundary_of_radius = 0.25;
   double doubted_tilt_of_blur = 0.025, doubted_length_of_blur = 0.001;
-  /// And what a processing that a blurred picture can't tell moves boundaries by.
+  /// And how far a processing that a blurred image can't show moves boundaries.
   double doubted_boundary_of_blur = 0.04;
 };
 inline constexpr UsualErrors usual_errors;
 
 /// Errors that all measurements of a group share (one sigma), by how much all noise is larger than each measurement
-/// says, and what is doubted before the print is blamed.
+/// says, and what is uncertain before the print is blamed.
 struct CommonErrors {
   std::array<double, measurement_groups> px{};
-  /// Of all boundaries alike (rms): moved along the shaft, leaning from side to side, bowed.
+  /// For all boundaries alike (rms): moved along the shaft, leaning from side to side, bowed.
   double whole_px = 0, leaning_px = 0, bowed_px = 0;
   /// By how much noise is larger than measurements say: of boundaries as they scatter, of sides no less than they say.
   double boundary_noise_scale = 1;
@@ -70,15 +71,15 @@ struct CommonErrors {
   RigErrors rig;
 };
 
-/// What a boundary of this blur as a whole may be off beside a camera's processing, on a shaft of this radius.
+/// The error of a boundary of this blur as a whole beside a camera's processing, on a shaft of this radius.
 double common_boundary_px(double blur_px, double radius_px);
 
 /// By how much `calibrate marker` takes noise larger: compression, motion blur and a camera's processing move edges of
 /// this sigma, which were blurred by this and moved by this.
 double doubt_scale(double sigma_px, double blur_px, double bias_px);
 
-/// What each boundary and side as a whole may be off, and the noise as it is. `bias_px`: by how much the camera's
-/// processing may have moved each boundary; of those that `processed` tells, it is corrected. `departure_px`: what is
+/// The errors of each boundary and side as a whole, and the noise as it is. `bias_px`: by how much the camera's
+/// processing may have moved each boundary; of those that `processed` shows, it is corrected. `departure_px`: what is
 /// left of a departure from the rig's camera.
 CommonErrors common_errors(const EdgeMeasurements& pass, const ResidualLines& lines, const EdgeBlur& blur,
                            const std::optional<ProcessedEdges>& processed, const std::array<double, 4>& bias_px,

@@ -44,7 +44,7 @@ UnknownVector solve(std::span<const Measurement> measurements, const std::option
   return step;
 }
 
-// What a pass changed.
+// The changes by a pass.
 struct Change {
   double points_px = 0;       // how far the farthest measured point moved
   double blur_fraction = 0;   // by how much the blur did, of what it was
@@ -103,7 +103,7 @@ class Fitter {
   const LightImage& light_;
   FineFit& fit_;
   double film_m_ = film_mean_m;
-  PoseUnknowns settled_;  // of the passes, before the print is told
+  PoseUnknowns settled_;  // of the passes, before the print is known
   EdgeMeasurements pass_;
   EdgeBlur located_with_;
   std::optional<ProcessedEdges> processed_;
@@ -218,7 +218,7 @@ void Fitter::judge(const Expected& expected) {
   count_turn(expected);
 }
 
-// What a turn within the exposure adds to sigma.
+// The part of sigma by a turn within the exposure.
 void Fitter::count_turn(const Expected& expected) {
   const TurnBlur turn = turn_blur(pass_, located_with_, fit_.processing == Processing::found);
   const auto change_rad = expected.moved_on

@@ -15,7 +15,8 @@ namespace lapservo::internal {
 
 /// How a fine fit settles.
 struct FineFitLimits {
-  /// What a point may be off beside its noise and still agrees with the fit: edges of blood beside a boundary move it.
+  /// How far a point may be off beside its noise and still agree with the fit: edges of blood beside a boundary move
+  /// it.
   double tolerated_px = 0.037;
   double settled_px = 1.5;    ///< a pass that moves no point farther is the last
   double settled_blur = 0.1;  ///< change of the blur, a fraction of it, below which edges need not be located again
@@ -26,7 +27,7 @@ struct FineFitLimits {
   double settled_sigmas = 0.01;      ///< a reweighting that moves the unknowns by less is the last
   double other_blur = 0.05;          ///< a change of the mean blur from one frame to the next, a fraction of it
   double well_seen_fraction = 0.7;   ///< of the boundary points, to blame the print or the registration
-  double least_rcm_sigma_m = 1e-7;   ///< of an exact registration: a hundredth of what images tell
+  double least_rcm_sigma_m = 1e-7;   ///< of an exact registration: a hundredth of what images show
 };
 inline constexpr FineFitLimits fine_fit_limits;
 
@@ -46,15 +47,15 @@ struct FineFit {
   double inlier_rms_sigmas = 0;   ///< of the boundaries' residuals, print errors taken out, by noise and tolerated_px
   double off_probability = 0, p_false = 1, p_false_by_tolerance = 0;  ///< as PrintFit has them
   double psi_variance_by_tolerance = 0;         ///< of the covariance, what the rig's tolerance of the print adds
-  bool asked = false;                           ///< what the camera did to the picture
-  Processing processing = Processing::unknown;  ///< as far as asked
+  bool asked = false;                           ///< what the camera did to the image
+  Processing processing = Processing::unknown;  ///< as far as wanted
   int processing_explained = 0;                 ///< how often ProcessingEvidence::explained
   int asked_for_departure = 0;                  ///< how often find_departure() was
   int passes = 0;                               ///< in which edges were located
   std::array<double, 4> bias_px{};              ///< by how much that may have moved each boundary
   CameraDeparture departure;                    ///< from the rig's camera, as far as known
 
-  /// Of the boundary points that the image could show, the fraction that was located.
+  /// The fraction that was located of the boundary points that the image could show.
   double located_fraction() const;
   /// Mean square of these points' residuals [sigma^2], with the inliers' limit for each that was not located: of two
   /// fits to a frame the better one has less.
@@ -64,11 +65,11 @@ struct FineFit {
   bool is_well_seen() const { return located_fraction() > fine_fit_limits.well_seen_fraction; }
 };
 
-/// What the frames before make likely. `ask`: whether to look at what the camera did to the picture beyond its response
+/// Expectations by the frames before. `ask`: whether to look at what the camera did to the image beyond its response
 /// (picture_processing.h), which costs a tenth of a tracked frame's time where it did nothing. bias_px, an earlier
-/// frame's, is what a frame that can't tell is in doubt by. `departure` is what earlier frames showed of the camera. A
-/// frame whose boundaries' mean blur is another than `blur_px` is asked in any case: the camera's sharpening may have
-/// been switched on.
+/// frame's, is the uncertainty of a frame that can't show it. `departure` is what earlier frames showed of the camera.
+/// A frame whose boundaries' mean blur is another than `blur_px` is examined in any case: the camera's sharpening may
+/// have been switched on.
 struct Expected {
   bool ask = true;
   std::array<double, 4> bias_px{};

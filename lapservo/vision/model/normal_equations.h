@@ -31,7 +31,7 @@ class NormalEquations {
   std::array<double, fit_unknowns> gradient_{};
 };
 
-/// Of a symmetric positive definite matrix; nullopt when it is none to within rounding.
+/// For a symmetric positive definite matrix; nullopt when it is none to within rounding.
 std::optional<UnknownMatrix> inverse_of(const UnknownMatrix& information);
 
 /// Robust weights of all fits: the Cauchy loss' scale, and what is no inlier.

@@ -12,8 +12,8 @@
 namespace lapservo::internal {
 namespace {
 
-// Sums over a group of the weighted products of: the row of pose and film, that of the print's errors at its two
-// edges, the residual, and 1. Of fixed size, which is several times faster; symmetric, of which the lower half is
+// Sums over a group of the weighted products of: the row of pose and film, that of the print's errors at its two edges,
+// the residual, and 1. They have a fixed size, which is several times faster; symmetric, of which the lower half is
 // summed.
 class Products {
  public:
@@ -54,7 +54,7 @@ class Products {
   Eigen::Matrix<double, size, size> sums_ = Eigen::Matrix<double, size, size>::Zero();
 };
 
-// Adds a group's products to the sums of all, and tells its pull.
+// Adds a group's products to the sums of all, and returns its pull.
 GroupPull gathered(const Products& products, std::size_t group, PrintEquations& all) {
   GroupPull pull;
   pull.x = products.x(Products::at_one);

@@ -43,19 +43,19 @@ struct PrintEquations {
   }
 };
 
-/// What a group of measurements says together: sums of weighted rows and residuals.
+/// The evidence of a group of measurements together: sums of weighted rows and residuals.
 struct GroupPull {
   UnknownVector x = UnknownVector::Zero();
   PrintVector n = PrintVector::Zero();
   double weight = 0, residual = 0, error_px = 0;
 };
 
-/// What one sigma of a number of the rig's camera does to the measurements of all groups.
+/// The effect of one sigma of a number of the rig's camera on the measurements of all groups.
 struct CameraPull : GroupPull {
   std::array<double, measurement_groups> by_group{};  ///< sums of weights times what it moves
 };
 
-/// Of all measurements; what each group says, and what errors do that all boundaries or all groups share.
+/// For all measurements; what each group says, and what errors do that all boundaries or all groups share.
 struct PrintSums {
   PrintEquations equations;
   std::array<GroupPull, measurement_groups> pulls;
@@ -70,8 +70,8 @@ PrintSums print_sums(std::span<const Measurement> measurements, const ResidualLi
 /// The same of a shaft that is held at the RCM.
 PrintSums held(PrintSums sums, const RcmMeasurement& rcm);
 
-/// What the residuals say about the print's errors, whatever the pose, the film and the common errors are. Nullopt when
-/// they say nothing.
+/// The residuals' evidence about the print's errors, whatever the pose, the film and the common errors are. Nullopt
+/// when they say nothing.
 std::optional<PrintInformation> information_of(const PrintSums& sums);
 
 /// By how much the print's errors move a measurement.
@@ -81,7 +81,7 @@ inline double print_shift_px(const Measurement& m, const PrintVector& print_mm) 
   return print_row(m).dot(Eigen::Vector2d(print_mm[errors[0]], print_mm[errors[1]]));
 }
 
-/// Of pose and film, and of the print's errors.
+/// For pose and film, and for the print's errors.
 struct PrintSolution {
   UnknownVector step = UnknownVector::Zero();
   PrintVector print_mm = PrintVector::Zero();

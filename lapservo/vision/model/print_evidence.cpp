@@ -11,7 +11,7 @@ const PrintVector& inner_shift() {
   return c;
 }
 
-// Of a matrix in which boundaries stand in blocks of their own.
+// For a matrix in which boundaries stand in blocks of their own.
 PrintMatrix inverse_by_boundary(const PrintMatrix& information) {
   PrintMatrix inverse = PrintMatrix::Zero();
   for (const auto& [upper, lower] : errors_of_boundary) {

@@ -6,14 +6,14 @@
 
 namespace lapservo::internal {
 
-/// What residuals say about the print's errors: the Gaussian likelihood exp(gradient . x - x . information x / 2), x in
-/// millimetres.
+/// The residuals' evidence about the print's errors: the Gaussian likelihood exp(gradient . x - x . information x / 2),
+/// x in millimetres.
 struct PrintInformation {
   PrintMatrix information = PrintMatrix::Zero();  ///< positive semi-definite
   PrintVector gradient = PrintVector::Zero();
 };
 
-/// What they say when such shapes of unknown size (one sigma each) may be in them: the covariance that the information
+/// Their evidence when such shapes of unknown size (one sigma each) may be in them: the covariance that the information
 /// stands for grows by them (the Woodbury identity, a shape at a time).
 PrintInformation doubted(PrintInformation print, std::span<const PrintVector> shapes_mm);
 

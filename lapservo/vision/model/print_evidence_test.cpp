@@ -16,7 +16,7 @@ PrintVector random_vector(Random& random) {
   return v;
 }
 
-// Of so many measurements; fewer than six leave directions of which nothing is known.
+// For so many measurements; fewer than six leave directions of which nothing is known.
 PrintInformation random_information(Random& random, int measurements) {
   PrintInformation print;
   for (int i = 0; i < measurements; ++i) {
@@ -56,7 +56,7 @@ TEST(PrintEvidence, IsThatOfTheMarginalLikelihood) {
     for (const double bands_mm : {0.0, 0.01, 0.16, 0.64}) {
       const PrintInformation print = random_information(random, 12);
       const PrintPrior prior{bands_mm, ink_mm};
-      // What is measured of the errors is normal: by the noise alone, or with a print of the prior beneath it.
+      // Measured errors are normal: by the noise alone, or with a print of the prior beneath it.
       const PrintMatrix noise = print.information.inverse(), both = noise + covariance_of_prior(prior);
       const PrintVector measured = noise * print.gradient;
       const auto log_likelihood = [&](const PrintMatrix& covariance) {

@@ -101,7 +101,7 @@ class Mixture {
   InplaceVector<Part, hypotheses> parts_;
 };
 
-// What the frame says of pose and print: each size of errors with its weight, and the mean over them.
+// The frame's evidence about pose and print: each size of errors with its weight, and the mean over them.
 struct Judgement {
   Hypotheses all;
   PrintSolution as_the_rig_says;
@@ -112,7 +112,7 @@ std::optional<Judgement> judged(const PrintSums& sums, const Hypotheses& prior, 
                                 const Marker& marker) {
   const auto as_the_rig_says = solved_with_print(sums, prior[0].prior);
   if (!as_the_rig_says) return std::nullopt;
-  // Nothing, where the frame tells nothing of the print.
+  // Nothing, where the frame shows nothing of the print.
   const PrintInformation print = information_of(sums).value_or(PrintInformation{});
   Judgement out{weighted(prior, doubted(print, doubted_shapes_mm(doubt, sums, marker))), *as_the_rig_says, {}};
   out.mixture.add(*as_the_rig_says, out.all[0].weight);

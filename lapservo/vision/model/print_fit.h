@@ -17,8 +17,8 @@ struct ErrorSize {
   double mm, fraction;
 };
 
-/// What is assumed of prints. A print is the rig's, or its bands are off by one of these sizes; and, whatever its bands
-/// are, its middle ink may lie aside by one of these. Twice the size is half as often: that is believed of prints made
+/// Assumptions about prints. A print is the rig's, or its bands are off by one of these sizes; and, whatever its bands
+/// are, its middle ink may lie aside by one of these. Twice the size is half as often: that is assumed of prints made
 /// by hand, and no measurement.
 struct PrintLimits {
   std::array<ErrorSize, 7> bands{
@@ -28,7 +28,7 @@ struct PrintLimits {
   double fraction_of_known = 1e-4;
   double off_mm = 0.04;      ///< a print is off by this and more
   double min_weight = 1e-6;  ///< of a size that counts
-  /// Of the RCM: from the one on prints that are off are asked, too; from the other on it lies elsewhere.
+  /// Of the RCM: from the one on misprints are examined, too; from the other on it lies elsewhere.
   double clearly_missed_sigmas = 3, contradicted_sigmas = 5;
 };
 inline constexpr PrintLimits print_limits;
@@ -59,11 +59,11 @@ struct RcmBesideFit {
   bool held_by_passes = false, may_be_contradicted = false;
 };
 
-/// Tells the print's errors from the settled measurements' residuals. How large they usually are is not known, so the
-/// pose is a mean over the rig's print and prints that are off (PrintLimits), each weighted by how likely it makes the
-/// residuals. On return the residuals are those that the step and the print's likeliest errors leave.
-/// `lines` are those of these residuals, `film_prior` as the fit has it, `is_known`: earlier frames showed that the
-/// print is the rig's. Nullopt when a direction is not seen at all.
+/// Estimates the print's errors from the settled measurements' residuals. How large they usually are is not known, so
+/// the pose is a mean over the rig's print and misprints (PrintLimits), each weighted by how likely it makes the
+/// residuals. On return the residuals are those that the step and the print's likeliest errors leave. `lines` are those
+/// of these residuals, `film_prior` as the fit has it, `is_known`: earlier frames showed that the print is the rig's.
+/// Nullopt when a direction is not seen at all.
 std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const ResidualLines& lines,
                                   const std::optional<RcmBesideFit>& rcm, double film_prior, const Marker& marker,
                                   bool is_known, const CommonErrors& errors);

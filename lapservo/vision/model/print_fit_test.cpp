@@ -84,7 +84,7 @@ TEST(PrintFit, AnInkAsideIsSeenAndPsiIsRightAllTheSame) {
     }
 }
 
-// A hidden boundary may lie anywhere, and a print that is off then looks like a turn.
+// A hidden boundary may lie anywhere, and a misprint then looks like a turn.
 TEST(PrintFit, WhatHidesABoundaryLeavesPsiInDoubtUnlessThePrintWasMeasured) {
   for (const std::size_t boundary : {1U, 2U})
     for (std::uint64_t seed = 1; seed <= shots; ++seed) {

@@ -12,7 +12,7 @@ namespace lapservo::internal {
 struct ResidualLine {
   double at_start = 0, slope = 0;  ///< at tau = 0; a turn
 
-  /// What the line leaves of a residual.
+  /// The rest of a residual after the line.
   double residual_px(const Measurement& m) const;
 };
 using ResidualLines = std::array<ResidualLine, measurement_groups>;

@@ -31,7 +31,7 @@ struct Steepness {
   bool shows(std::size_t boundary) const { return points[boundary] >= turn_blur_limits.min_points; }
 };
 
-// What else may have blurred one boundary by more than another [px^2].
+// Other blurs of one boundary by more than another [px^2].
 double else_px2(const EllipseEvidence::Squares& blurs, const Steepness& steepness, double sides_px, bool processed) {
   const double usual_px2 = usual_blur_px * usual_blur_px;
   double ends_px2 = 0;

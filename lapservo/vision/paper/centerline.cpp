@@ -19,9 +19,9 @@
 namespace lapservo::internal {
 namespace {
 
-// Of a boundary along the line, and of the line across itself at either end: medians of absolute errors (as one sigma)
-// of `lapservo render --rig configs/example.yaml --count 60 --seed 101`, 0.6 (inner boundaries) and 0.5. In dark, noisy
-// and compressed frames the latter is 0.5 to 0.9.
+// Sigmas of a boundary along the line, and of the line across itself at either end: medians of absolute errors (as one
+// sigma) of `lapservo render --rig configs/example.yaml --count 60 --seed 101`, 0.6 (inner boundaries) and 0.5. In
+// dark, noisy and compressed frames the latter is 0.5 to 0.9.
 constexpr double boundary_sigma_px = 0.7, across_sigma_px = 0.5;
 constexpr double widest_hue_deg = 30;
 constexpr int min_saturation = 60, min_value = 40, min_area_px = 150;

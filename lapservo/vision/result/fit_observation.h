@@ -9,7 +9,7 @@ namespace lapservo::internal {
 /// A fit that was accepted, as the user sees it: Status::ok, or Status::poor_fit where the pose shows no centre line.
 Observation observation_of(const Scene& scene, const FineFit& fit);
 
-/// Of this status, with the pose that was refused.
+/// An observation of this status, with the pose that was refused.
 Observation refused_observation(Status why, const ShaftPose& pose);
 
 }  // namespace lapservo::internal

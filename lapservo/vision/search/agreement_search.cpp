@@ -19,7 +19,7 @@ constexpr std::size_t most_peaks = 4, most_results = 3;
 // Blood along a side makes a shaft look thin, so far away.
 constexpr std::array depth_scales{0.64, 0.8, 1.0};
 
-// What is seen in the middle of the marker, at another depth.
+// The pose that shows the same in the middle of the marker, at another depth.
 std::optional<PoseUnknowns> seen_at_depth(const PoseUnknowns& start, double scale, const Rigid3& camera_from_rcm,
                                           double length_m) {
   const Rigid3& pose = start.pose().camera_from_unrolled;

@@ -22,7 +22,7 @@ class AgreementSearch {
   /// Goes on in this frame. Whether it came to its end; false when the budget did first.
   bool advance(const Scene& scene, WorkBudget& budget);
 
-  /// Of a search that came to its end: up to three results (of different rotations), the best last.
+  /// After a search that came to its end: up to three results (of different rotations), the best last.
   std::vector<PoseUnknowns> results() const;
 
   /// One of them, good to a few pixels in this frame.

@@ -28,7 +28,7 @@ struct BloodyShot {
   explicit BloodyShot(std::uint64_t seed) : BloodyShot(seed, Random(seed)) {}
   PoseUnknowns truth() const { return {scenes::pose_of(rig, 0, q), true}; }
   double length_m() const { return rig.instruments[0].marker.length_m(); }
-  // Of any rotation, at another depth along the line of sight.
+  // A pose of any rotation, at another depth along the line of sight.
   PoseUnknowns start(double depth_scale) const {
     const Rigid3& camera_from_rcm = *rig.instruments[0].camera_from_rcm;
     const Eigen::Vector3d place = depth_scale * truth().pose().camera_from_unrolled.translation;
@@ -86,7 +86,7 @@ TEST(AgreementSearch, GoesOnFromWhereItsBudgetEnded) {
     EXPECT_EQ(scenes::q_of(shot.rig, spread[i]).vector(), scenes::q_of(shot.rig, whole[i]).vector());
 }
 
-// What the search climbs: the truth lies higher than what is beside it, however much blood there is.
+// The search's measure: the truth lies higher than what is beside it, however much blood there is.
 TEST(ExplainedColours, AreMostAtTheTruth) {
   int higher = 0, asked = 0;
   for (std::uint64_t seed = 1; seed <= 6; ++seed) {
@@ -114,7 +114,7 @@ TEST(ExplainedColours, OfAnyRotationAreAtLeastThoseOfEach) {
   }
 }
 
-// A search keeps only what is better: of anything else it may be told that it is nothing.
+// A search keeps only what is better: anything else may be called nothing.
 TEST(ExplainedColours, AreTheSameWhereOnlyMoreThanOthersAreAskedFor) {
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     const BloodyShot shot(seed);

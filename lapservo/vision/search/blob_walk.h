@@ -14,11 +14,11 @@ namespace lapservo::internal {
 /// another order, so those that were looked at are known by their place, which moves with them.
 class BlobWalk {
  public:
-  /// Of this frame's blobs those that were not looked at yet: first the one in which it stopped, then the largest.
+  /// Those of this frame's blobs that were not looked at yet: first the one in which it stopped, then the largest.
   /// `reach_px`: no blob moves farther from frame to frame.
   std::vector<const Blob*> rest(const std::vector<Blob>& blobs, double reach_px);
 
-  /// Which start of the first of the rest is next. Of the others it is the first.
+  /// Which start of the first of the rest is next. For the others it is the first.
   std::size_t start() const { return start_; }
 
   void stop(const Blob& blob, std::size_t next_start);

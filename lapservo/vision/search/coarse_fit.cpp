@@ -151,7 +151,7 @@ void add_curve_distance(const Scene& scene, const PoseUnknowns& unknowns, const 
   equations.add(row, residual_px, cauchy_weight(residual_px / sigma_px, cauchy_scale_sigmas) / (sigma_px * sigma_px));
 }
 
-// Where a boundary lies on a generatrix, and how that changes with tau. Of a rotation that is not known yet, ends in
+// Where a boundary lies on a generatrix, and how that changes with tau. For a rotation that is not known yet, ends in
 // the middle of where they lie over the turn.
 struct Place {
   double along_m, slope_m;

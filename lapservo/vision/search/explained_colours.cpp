@@ -12,7 +12,7 @@
 namespace lapservo::internal {
 namespace {
 
-// What a sample gains; one that has the colour that belongs there 1.
+// The gain of a sample; one that has the colour that belongs there 1.
 struct SampleGains {
   double another_band = -1, blood = -0.15, bare = -0.6;                   // on the marker
   double marker_beyond = -0.5, bare_beyond = 0.15, blood_beyond = -0.15;  // beyond its ends, on the shaft
@@ -63,7 +63,7 @@ BandsOfClass bands_of_class(const Scene& scene) {
   return bands;
 }
 
-// Of a pixel without the marker's colour: whether it is as grey as bare shaft, or as red as blood.
+// For a pixel without the marker's colour: whether it is as grey as bare shaft, or as red as blood.
 bool is_grey(const std::uint8_t* bgr) {
   constexpr int dark = 20;  // there noise makes any colour
   constexpr double least_saturation = 0.35;
@@ -121,7 +121,7 @@ class LineInImage {
   Places u_px_, v_px_, depth_m_;
 };
 
-// What a sample gains by what it shows: blood, none, another band, the right one.
+// The gain of a sample by what it shows: blood, none, another band, the right one.
 using Gains = std::array<double, 4>;
 constexpr Gains gains_on_marker{sample_gains.blood, sample_gains.bare, sample_gains.another_band, 1};
 constexpr Gains gains_beyond{sample_gains.blood_beyond, sample_gains.bare_beyond, sample_gains.marker_beyond,

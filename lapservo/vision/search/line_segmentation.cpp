@@ -9,7 +9,7 @@ namespace {
 constexpr std::size_t max_samples = 512;
 constexpr std::size_t states = 5;  // shaft, band 0, 1, 2, shaft
 
-// What a boundary needs on each of its sides to count as seen.
+// The least on each side of a boundary to count as seen.
 bool supported(std::span<const std::uint8_t> classes, std::size_t boundary, std::size_t k,
                const std::array<std::uint8_t, 3>& bands) {
   constexpr std::size_t reach = 4, needed = 3;
@@ -21,7 +21,7 @@ bool supported(std::span<const std::uint8_t> classes, std::size_t boundary, std:
          std::count(at, at + reach, after) >= static_cast<std::ptrdiff_t>(needed);
 }
 
-// line_reward() in a table: the colours that it tells apart, and what each gains in every state.
+// line_reward() in a table: the colours that it separates, and what each gains in every state.
 class Rewards {
  public:
   explicit Rewards(const std::array<std::uint8_t, 3>& bands) {

@@ -29,7 +29,7 @@ inline std::optional<double> agreed_end(std::vector<double>& places) {
   return places.size() < 2 ? std::nullopt : std::optional(median(places));
 }
 
-/// What segment_line gains from a sample of a colour in a state: 0 shaft, 1..3 the bands, 4 shaft. Internal.
+/// The gain of segment_line from a sample of a colour in a state: 0 shaft, 1..3 the bands, 4 shaft. Internal.
 inline float line_reward(std::size_t state, std::uint8_t colour, const std::array<std::uint8_t, 3>& bands) {
   if (colour == Scene::outside) return 0;
   if (state == 0 || state == 4) return colour == 0 ? 0.3F : -0.7F;

@@ -121,7 +121,7 @@ Found MarkerSearch::detect_in_blob(const SearchFrame& frame, bool through_rcm, c
     }
     Found found = try_start(frame.scene, frame.light, starts[i], budget);
     if (!found.fit) {
-      // A print that is off is no reason to look for it elsewhere, with a boundary less.
+      // A misprint is no reason to look for the marker elsewhere, with a boundary less.
       if (found.status == Status::marker_mismatch) return found;
       if (!best.fit && found.status != Status::no_marker) best = found;
       continue;
@@ -148,8 +148,8 @@ Found MarkerSearch::detect(const SearchFrame& frame, bool through_rcm, Walk& wal
   return best;
 }
 
-// Whether the marker shows in another place as well: a second print, a reflection, a picture of tiles. The RCM would
-// tell which is ours. All in one frame: in another one a rival may be where none was.
+// Whether the marker shows in another place as well: a second print, a reflection, an image of tiles. The RCM would
+// show which is ours. All in one frame: in another one a rival may be where none was.
 MarkerSearch::Rival MarkerSearch::look_for_rival(const SearchFrame& frame, const FineFit& fit, WorkBudget& budget) {
   const Scene& scene = frame.scene;
   const auto middle = [&](const PoseUnknowns& unknowns) {
@@ -205,13 +205,13 @@ Found MarkerSearch::look_without_rcm(const SearchFrame& frame, WorkBudget& budge
   const Rival rival = look_for_rival(frame, *candidate_, budget);
   Found found{Status::ambiguous, std::nullopt, std::nullopt};
   if (rival == Rival::none) found = {Status::ok, std::move(candidate_), {}};
-  // What was found says nothing of a later frame in which it is lost.
+  // A result says nothing of a later frame in which it is lost.
   if (rival != Rival::not_known_yet) begin_anew(rival == Rival::none ? Status::no_marker : found.status);
   return found;
 }
 
-// What shows plainly, but elsewhere than the RCM allows. That psi holds whatever the print is, validate() has asked: a
-// print that is off would contradict any registration.
+// A marker that shows plainly, but elsewhere than the RCM allows. That psi holds whatever the print is, validate() has
+// tested: a misprint would contradict any registration.
 Found MarkerSearch::despite_registration(const SearchFrame& frame, bool plain_is_known, WorkBudget& budget) {
   Found free = detect(frame, false, free_, budget);
   if (!free.fit || !free.fit->is_well_seen()) return {};
@@ -275,7 +275,7 @@ Found MarkerSearch::look_long(const SearchFrame& frame, bool is_mismatch, bool p
 }
 
 Found MarkerSearch::look_with_rcm(const SearchFrame& frame, WorkBudget& budget) {
-  // What other blobs gave was worse than it, and is gone with it.
+  // The result of other blobs was worse than it, and is gone with it.
   if (candidate_ && lost_candidate(frame, budget))
     hidden_ = {}, agreement_.reset(), results_.reset(), has_rivals_ = false;
   const bool from_the_first = !plain_.blobs.begun();

@@ -15,7 +15,7 @@
 
 namespace lapservo::internal {
 
-/// What looking for a marker came to.
+/// The result of looking for a marker.
 struct Found {
   Status status = Status::no_marker;
   std::optional<FineFit> fit;        ///< when ok
@@ -38,8 +38,8 @@ Found follow(const Scene& scene, const LightImage& light, const PoseUnknowns& ex
 
 /// Looks for one marker all over a frame: first for what shows plainly, of a well known RCM on lines through it, else
 /// by the blobs' outlines; of a well known RCM then without regard to it, and at last for markers that are hidden in
-/// large parts, which takes tens of milliseconds. What the budget does not allow is done in the frames to come, from
-/// where it stopped. What shows plainly is looked for in each of them.
+/// large parts, which takes tens of milliseconds. Work beyond the budget is done in the frames to come, from where it
+/// stopped. Markers that show plainly are looked for in each of them.
 class MarkerSearch {
  public:
   /// While the search goes on, the status is what it knows so far, or the last whole search came to.

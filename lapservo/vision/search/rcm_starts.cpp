@@ -51,7 +51,7 @@ struct Fan {
 // By band, the cosines of its samples' betas.
 using BandCosines = std::array<std::vector<double>, 3>;
 
-// Whether the middle band and another one show, as the inner boundaries tell psi, and no band lies wholly on the wrong
+// Whether the middle band and another one show, as the inner boundaries show psi, and no band lies wholly on the wrong
 // side of its neighbour, as in another marker's order. A blob of several markers may have all orders.
 bool may_be_in_order(BandCosines& bands) {
   constexpr std::size_t min_samples = 2;
@@ -176,7 +176,7 @@ std::vector<Window> best_windows(const Scene& scene, const Fan& fan, const Lines
   return best;
 }
 
-// What a window shows of the marker.
+// A window's view of the marker.
 struct Extent {
   double alpha_rad, width_rad;
   std::optional<double> first_beta_rad, last_beta_rad;
@@ -226,7 +226,8 @@ Extent extent_of(const Scene& scene, const RaysFromRcm& rays, const Fan& fan, co
   return extent;
 }
 
-// How far away the proximal end is, by the length that the marker shows; by its width where the length does not tell.
+// How far away the proximal end is, by the length that the marker shows; by its width where the length does not show
+// it.
 double distance_of(const Scene& scene, const RaysFromRcm& rays, const Extent& extent, double first_beta_rad,
                    double rcm_m) {
   constexpr int steps = 120;
@@ -265,7 +266,7 @@ std::optional<PoseUnknowns> start_of(const Scene& scene, const RaysFromRcm& rays
   return q ? std::optional(PoseUnknowns(pose_through_rcm(camera_from_rcm, *q), true)) : std::nullopt;
 }
 
-// Of lines that are split as the scene shows them.
+// For lines that are split as the scene shows them.
 std::vector<PoseUnknowns> starts_on_lines(const Scene& scene, const RaysFromRcm& rays, const Fan& fan,
                                           const Rigid3& camera_from_rcm) {
   Lines lines;

@@ -7,8 +7,8 @@
 
 namespace lapservo::internal {
 
-/// What looking at a frame may cost, in units of work. They are counted by what is done (SearchCosts says how many
-/// units a step has), not by a clock: the same frames give the same results whatever else the machine does.
+/// The budget of a frame, in units of work. Units are counted by what is done (SearchCosts says how many units a step
+/// has), not by a clock: the same frames give the same results whatever else the machine does.
 class WorkBudget {
  public:
   /// nullopt: without a bound.
@@ -45,10 +45,10 @@ class WorkBudget {
   Beyond beyond_ = Beyond::none;
 };
 
-/// What the steps of a search cost, in units of work. A unit is 0.44 us of a core that copies a frame
-/// of 1920x1080 in 0.125 ms. Measured in the sequences of bench/hard_frames at that size, each step the least of four
-/// replays: of what a frame has few of, the 90th percentile; of what it has hundreds of, the mean of the frames with
-/// most of them. What a step took is spent; what must be left for it to begin is what most take.
+/// Costs of the steps of a search, in units of work. A unit is 0.44 us of a core that copies a frame of 1920x1080 in
+/// 0.125 ms. Measured in the sequences of bench/hard_frames at that size, each step the least of four replays: of what
+/// a frame has few of, the 90th percentile; of what it has hundreds of, the mean of the frames with most of them. A
+/// step's cost is spent; what must be left for it to begin is what most take.
 struct SearchCosts {
   double coarse_fit = 320, no_coarse_fit = 160;  ///< one that found the shaft; one that did not
   double fine_pass = 180, fine_end = 160;        ///< of a fine fit; when it converged, the print and its validation
@@ -58,7 +58,7 @@ struct SearchCosts {
   double starts = 330;                           ///< of one that has; beside others lines are split twice
   double agreement = 12;                         ///< of one pose with the frame's colours
   double blobs_per_px = 2.2e-4;
-  double part_beside = 0.6;  ///< of the budget where every sample is asked whether another instrument hides it
+  double part_beside = 0.6;  ///< of the budget where every sample is tested for another instrument that hides it
   double cover = 1300;       ///< where one instrument lies, for who looks for another beside or behind it
   double starts_in_blob(bool beside_others) const { return beside_others ? 2 * starts : starts; }
   double fine_fit() const { return 3 * fine_pass + fine_end; }

@@ -21,7 +21,7 @@ struct RcmMeasurement {
   bool is_proximal = true;  ///< the RCM lies on the marker's proximal side, as that of every shaft does
 };
 
-/// What a rig knows of where an instrument's RCM frame is.
+/// The rig's knowledge of an instrument's RCM frame.
 struct RcmPrior {
   Rigid3 camera_from_rcm;
   /// Covariance of the translation [m], then of a rotation vector about the camera's axes [rad]. Zero of a registration

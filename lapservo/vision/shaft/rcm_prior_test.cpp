@@ -96,7 +96,7 @@ TEST(RcmPrior, IsKnownToARadiusOrNot) {
   EXPECT_FALSE(registration.is_within(1.5e-3));
 }
 
-// Of a pose and a registration whose errors are correlated.
+// For a pose and a registration whose errors are correlated.
 TEST(ConfigurationEstimate, HasTheSpreadOfWhatIsDrawn) {
   Random random(9);
   const Scene scene(random);

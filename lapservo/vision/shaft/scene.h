@@ -58,7 +58,7 @@ struct Scene {
   bool hidden(const Eigen::Vector2d& raw_px, double depth_m) const {
     return !others.empty() && hidden_by_others(raw_px, depth_m);
   }
-  /// Whether the registration tells on which lines of the image the shaft may lie.
+  /// Whether the registration shows on which lines of the image the shaft may lie.
   bool knows_rcm() const { return registration && registration->is_within(marker.radius_m()); }
   /// Whether it is the class of one of the marker's bands.
   bool is_ours(std::uint8_t colour) const { return colour == bands[0] || colour == bands[1] || colour == bands[2]; }

@@ -159,7 +159,7 @@ bool may_meet(const Camera& camera, const Marker& marker, const ShaftPose& pose,
   const auto marked = marker_in_image(camera, marker, pose);
   const auto shaft = shaft_in_image(camera, others_marker, other);
   if (!marked || !shaft) return false;
-  // Of the other's shaft what is nearest to the camera may be far from here.
+  // The part of the other's shaft that is nearest to the camera may be far from here.
   const double others_nearest_m = std::max({nearest_m, shaft->nearest_m, on_axis(other, 0).z() / 2});
   const double radii_px =
       camera.fx_px * (marker.radius_m() / marked->nearest_m + others_marker.radius_m() / others_nearest_m);

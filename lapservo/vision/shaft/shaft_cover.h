@@ -17,7 +17,7 @@
 namespace lapservo::internal {
 
 /// Where in the image an instrument lies that was found: its marker and the shaft on both sides, with some pixels of
-/// doubt. For those who look for another instrument there. In cells of cell_px pixels.
+/// margin. For those who look for another instrument there. In cells of cell_px pixels.
 class ShaftCover {
  public:
   static constexpr int cell_px = 4;
@@ -31,7 +31,7 @@ class ShaftCover {
   void clear() { drawn_ = false; }
   bool drawn() const { return drawn_; }
 
-  /// Whether a pixel of this colour class shows the marker, as far as colours tell.
+  /// Whether a pixel of this colour class shows the marker, as far as colours show.
   bool explains(double u_px, double v_px, std::uint8_t colour) const {
     const auto cell = index(u_px, v_px);
     return cell && (cells_[*cell].colours & bit(colour)) != 0;
@@ -82,11 +82,11 @@ bool may_meet(const Camera& camera, const Marker& marker, const ShaftPose& pose,
 bool lies_beside(const Camera& camera, const Marker& others_marker, const ShaftPose& other, const Blob& blob,
                  const std::array<std::uint8_t, 3>& bands);
 
-/// Whether the marker of one of them shows in a pixel of this colour class, as far as colours tell.
+/// Whether the marker of one of them shows in a pixel of this colour class, as far as colours show.
 bool explained_by(std::span<const ShaftCover* const> others, const Eigen::Vector2d& raw_px, std::uint8_t colour);
 
-/// What the instruments that are known to be in the image leave of them, largest first. The parts of one that lies
-/// behind another stay together.
+/// The parts of them that the instruments that are known to be in the image leave, largest first. The parts of one that
+/// lies behind another stay together.
 std::vector<Blob> without(const std::vector<Blob>& blobs, std::span<const ShaftCover* const> others);
 
 }  // namespace lapservo::internal

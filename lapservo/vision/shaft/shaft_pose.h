@@ -27,7 +27,7 @@ double roll_between_rad(const Eigen::Quaterniond& from, const Eigen::Quaterniond
 /// The same pose in the unrolled frame of another turn about the axis, in which psi is this.
 ShaftPose in_azimuths_of(const ShaftPose& pose, double psi_rad);
 
-/// Of the shaft through the RCM.
+/// For the shaft through the RCM.
 ShaftPose pose_through_rcm(const Rigid3& camera_from_rcm, const JointVector& q);
 
 /// q of the shaft from the RCM to the marker's proximal end, with the pose's rotation about the axis. Nullopt where

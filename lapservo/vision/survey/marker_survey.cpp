@@ -16,14 +16,15 @@
 namespace lapservo::internal {
 namespace {
 
-// A print that is off by half a millimetre leaves nine tenths of the surface with the colour that the rig's would have.
+// An error of half a millimetre in the print leaves nine tenths of the surface with the colour that the rig's would
+// have.
 constexpr double min_matching = 0.6, max_wrong = 0.15;
 // Where boundaries are measured, what blurs luma is light's blur: libx264 hardly blurs it after the response, but a fit
-// of its wide and ragged blur of colour differences takes some, and then moves e2 by 0.155 px for 0.1.
-// A gradient of light is taken for none: of a turn they cancel, and what a fit of one video picture gives for it moves
-// boundaries by more than it does (psi by -2.5 mrad).
+// of its wide and ragged blur of colour differences takes some, and then moves e2 by 0.155 px for 0.1. A gradient of
+// light is taken for none: of a turn they cancel, and what a fit of one video frame gives for it moves boundaries by
+// more than it does (psi by -2.5 mrad).
 constexpr ExpectedPicture expected_picture{.least_sharpening = 0, .gradient_sigma_per_px = 0.002};
-// Of a video of a plain camera's pictures light's blur and its gradient come out right: 0.85 px for 0.85.
+// In a video of a plain camera's images light's blur and its gradient come out right: 0.85 px for 0.85.
 constexpr ExpectedPicture expected_video{.least_sharpening = 0, .gradient_sigma_per_px = 0.01, .only_video = true};
 
 // Without colour differences, which videos blur far more than luma.
@@ -34,8 +35,8 @@ cv::Mat grey_of(const cv::Mat& bgr) {
   return grey;
 }
 
-// The sides as another picture of the same shows them. Boundaries come first, so what is known of measurements by
-// their place stays true.
+// The sides as another image of the same shows them. Boundaries come first, so what is known of measurements by their
+// place stays true.
 void take_sides(const EdgeMeasurements& from, EdgeMeasurements& edges) {
   decltype(edges.all) all;
   for (const Measurement& m : edges.all)

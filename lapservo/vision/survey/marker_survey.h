@@ -28,7 +28,7 @@ struct Sighting {
 };
 
 /// Finds a marker whose print is not quite as the rig says (boundaries off by half a millimetre, wrapped askew, a gap
-/// at the seam): like SurfaceTracker, but whether the print is the rig's is not asked.
+/// at the seam): like SurfaceTracker, but whether the print is the rig's does not count.
 class MarkerSurvey {
  public:
   MarkerSurvey(const Rig& rig, std::size_t instrument);
@@ -64,12 +64,12 @@ struct ViewMeasurements {
   double blur_px = 1.2, film_m = film_mean_m;  ///< that they were measured with
   double turned_rad = 0;                       ///< about the axis since the frame before; the caller's to say
   double time_s = 0;                           ///< of the frame; the caller's to say
-  ProcessingEvidence processing;               ///< unknown when not asked
+  ProcessingEvidence processing;               ///< unknown when not wanted
   std::array<double, 4> bias_px{};             ///< taken off the boundaries; sides are measured in grey values then
 };
 
 /// Takes off each view's boundaries and sides what the camera's processing moved them by (picture_processing.h). Views
-/// that can't tell get the median of those that can, as it is one camera.
+/// that can't show it get the median of those that can, as it is one camera.
 void take_processing_off(std::vector<ViewMeasurements>& views);
 
 /// Whether colour differences blurred widely, as libx264 leaves them, explain what these views look like as well as any
@@ -83,7 +83,7 @@ class ViewMeasurer {
   ViewMeasurer(const Rig& rig, std::size_t instrument);
 
   /// How far edges are looked for: beyond the blur, and the seam's around the shaft; whether there may be a gap;
-  /// whether to find out what the camera did to the picture.
+  /// whether to find out what the camera did to the image.
   struct Reach {
     double extra_px = 3, seam_m = 0.5e-3;
     bool free_gap = true;

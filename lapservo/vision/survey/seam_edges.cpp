@@ -25,8 +25,8 @@ constexpr int stations = 40;
 constexpr std::size_t min_stations = 3;
 constexpr double floor_px = 0.04;  // what the model leaves out
 constexpr double max_sigma_px = 4;
-// What is left of the light is alike along the shaft and from pixel to pixel: a highlight beside an edge moves it by
-// 0.4 px, compression by 0.15, for which independent noise would make sigmas of 0.06 and 0.04.
+// The rest of the light is alike along the shaft and from pixel to pixel: a highlight beside an edge moves it by 0.4
+// px, compression by 0.15, for which independent noise would make sigmas of 0.06 and 0.04.
 constexpr double sigmas_by_alike_noise = 4;
 constexpr double min_explained = 0.8;  // of the light's variance that the edges leave unexplained without them
 
@@ -46,7 +46,7 @@ struct Profile {
 // are as narrow as the surface is smooth, which nobody knows: a wide one and a narrow one, powers of the cosine.
 constexpr std::array<double, 2> gloss_exponents{16, 64};
 
-// What a lamp beside the camera makes of a surface that is turned away from it.
+// The light of a lamp beside the camera on a surface that is turned away from it.
 struct LampLight {
   double matt;
   std::array<double, gloss_exponents.size()> gloss;
@@ -58,7 +58,7 @@ struct Section {
   std::vector<LampLight> lamp;
   std::vector<Profile> profiles;
   std::array<double, 3> shaft{0.02, 0.02, 0.02};  // light of the bare shaft
-  std::size_t channels = 3;                       // 1 of a grey picture: all show the same
+  std::size_t channels = 3;                       // 1 of a grey image: all show the same
 };
 
 struct SeamView {
@@ -349,8 +349,8 @@ std::vector<std::array<double, 3>> sampled(const std::vector<std::array<double, 
   return out;
 }
 
-// What the processing makes of light across edges that lie where they were found; `seen_px`: what blurs them in the
-// picture whose colours are fitted.
+// The effect of the processing on light across edges that lie where they were found; `seen_px`: what blurs them in the
+// image whose colours are fitted.
 Section processed(const Section& section, const SeamFit& found, double seen_px, double radius_m,
                   const PictureProcessing& processing, const std::array<float, 256>& light_of_value, bool grey) {
   const SeamBasis seen = basis_of(section, found.upper_m, found.gap_m, seen_px, radius_m);
@@ -388,7 +388,7 @@ std::optional<SeamFit> fit_by_colours(const Section& section, const SeamSearch& 
   return found;
 }
 
-// By the grey picture: colour differences are blurred far wider, over the gap and into each other.
+// By the grey image: colour differences are blurred far wider, over the gap and into each other.
 std::optional<SeamFit> fit_by_luma(const Section& colours, const Section& grey, const SeamSearch& search,
                                    double colours_px, const PictureProcessing& processing,
                                    const std::array<float, 256>& light_of_value) {

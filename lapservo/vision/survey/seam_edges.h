@@ -25,7 +25,7 @@ struct SeamEdges {
 
 /// Fits light across the seam: one band, the bare shaft, another band, blurred; colours and shading are free. Looks up
 /// to `reach_m` around the shaft from where pose and marker have the edges. Unless `free_gap`, the print's ends meet:
-/// one edge, the upper. What `processing` moves the edges by is taken off. `grey`: the picture without colour
+/// one edge, the upper. The effect of `processing` on the edges is taken off. `grey`: the image without colour
 /// differences, to locate the edges in where those are blurred. Nullopt when the seam does not face the camera or has
 /// no contrast.
 std::optional<SeamEdges> measure_seam(const Scene& scene, const LightImage& light, const PoseUnknowns& unknowns,

@@ -35,7 +35,7 @@ struct GapShot {
     const PoseUnknowns unknowns(scenes::pose_of(rig, 0, q), false);
     return measure_seam(sight.scene(), sight.light(), unknowns, blur_px, reach_m, true, processing);
   }
-  // As a picture without colour differences shows it, which `picture` has blurred.
+  // As an image without colour differences shows it, which `picture` has blurred.
   std::optional<SeamEdges> seam_by_luma(const cv::Mat& picture, const PictureProcessing& processing,
                                         double blur_px) const {
     constexpr double reach_m = 0.4e-3;
@@ -114,7 +114,7 @@ TEST(SeamEdges, LieWhereTheyAreBesideHighlights) {
   }
 }
 
-// What compression does to a seam is alike along the shaft.
+// The effect of compression on a seam is alike along the shaft.
 TEST(SeamEdges, KnowHowFarCompressionMovesThem) {
   effects::CameraEffects jpeg;
   jpeg.jpeg_quality = 50;
@@ -130,7 +130,7 @@ TEST(SeamEdges, KnowHowFarCompressionMovesThem) {
   }
   ASSERT_GE(seen, 12);
   EXPECT_LT(std::sqrt(squares / seen), 1.5) << seen;
-  EXPECT_LT(sigmas_px, 1) << "or nothing is told";
+  EXPECT_LT(sigmas_px, 1) << "or nothing is known";
 }
 
 }  // namespace
