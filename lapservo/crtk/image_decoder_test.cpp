@@ -1,5 +1,9 @@
 #include "lapservo/crtk/image_decoder.h"
 
+#include <cstdint>
+#include <utility>
+#include <variant>
+
 #include <gtest/gtest.h>
 #include <opencv2/imgproc.hpp>
 
@@ -57,6 +61,17 @@ TEST(ImageDecoder, ADecodedImageIsItsOwn) {
   const cv::Vec3b before = bgr_at(image, 0, 0);
   message.data.assign(message.data.size(), 0);
   EXPECT_EQ(bgr_at(image, 0, 0), before);
+}
+
+// A copy of each image of 1920x1080 would cost as much as a tracked frame.
+TEST(ImageDecoder, AnImageWithoutPaddingKeepsTheBytesOfItsMessage) {
+  ImageMessage message = message_of("bgr8", 3, 0);
+  const std::uint8_t* const bytes = message.data.data();
+  cv::Mat image = std::get<cv::Mat>(decode(std::move(message)));
+  EXPECT_EQ(image.data, bytes);
+  cv::Mat second = image;
+  image.create(5, 7, CV_8UC3);
+  EXPECT_EQ(second.at<cv::Vec3b>(0, 0), cv::Vec3b(3, 10, 17));
 }
 
 // Luma and both chroma of a colour by the equations of Rec. 601 (below 720 rows) or 709, limited range.
