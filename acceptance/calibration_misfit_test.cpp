@@ -190,8 +190,6 @@ TEST(CalibrationMisfit, Registration) {
 
 // --- camera
 
-const Board board{9, 6, 0.005};
-
 struct BoardDeparture {
   std::string name, cause;
   std::function<Camera(std::size_t, Camera)> camera = [](std::size_t, Camera c) { return c; };
@@ -230,17 +228,8 @@ std::vector<BoardDeparture> board_departures() {
 }
 
 Answer camera_of(const Recording& recording, const BoardDeparture& departure) {
-  constexpr int views = 12;
   const Camera truth = laboratory(recording.seed).camera;
-  BoardScene scene;
-  scene.noise *= recording.noise;
-  BoardViews shown(board, views);
-  const auto poses = board_poses(scene, truth, views, 100 * recording.seed);
-  for (std::size_t i = 0; i < poses.size(); ++i)
-    shown.add(std::to_string(i),
-              departure.image(i, render_board(scene, departure.camera(i, truth), poses[i], 1000 * recording.seed + i)),
-              true);
-  const CameraCalibration found = calibrate_camera(board, shown.take(), {});
+  const CameraCalibration found = calibration_of_camera(recording, departure.camera, departure.image);
   if (!found.refusal.empty()) return {found.refusal, {}};
   const Camera& camera = found.camera;
   const CameraSigmas& sigmas = found.sigmas;
@@ -268,47 +257,16 @@ TEST(CalibrationMisfit, Camera) {
 
 // --- marker
 
-// Every boundary off by up to 0.25 mm, at either edge by itself; half of the prints with a gap.
-Marker cut_by_hand(const Marker& nominal, Random& random) {
-  PrintShape shape = PrintShape::of(nominal);
-  const auto off_m = [&] { return random.uniform(-0.25e-3, 0.25e-3); };
-  for (std::size_t k = 1; k < 4; ++k) shape.upper_m[k] += off_m();
-  for (std::size_t k = 0; k < 4; ++k) shape.lower_m[k] += off_m();
-  shape.gap_rad = random.uniform() < 0.5 ? 0 : 0.8e-3 / nominal.radius_m();
-  return shape.on(nominal);
-}
-
 // From a turn there and back, in whose middle the lower edge slips; the truth is the mean of both prints.
 Answer marker_of(const Recording& recording, double slip_m) {
   const Rig nominal = laboratory(recording.seed);
-  Random random(recording.seed);
-  const Marker before = cut_by_hand(nominal.instruments[0].marker, random);
+  const Marker before = cut_by_hand(nominal.instruments[0].marker, recording.seed);
   const auto slipped = [&](double by_m) {
     PrintShape shape = PrintShape::of(before);
     for (double& lower_m : shape.lower_m) lower_m += by_m;
     return shape.on(before);
   };
-  Rig truth = nominal;
-  const cv::Mat tissue = make_tissue(truth.camera.width_px, truth.camera.height_px, recording.seed);
-  std::vector<Renderer> renderers;
-  for (const double by_m : {0.0, slip_m}) {
-    truth.instruments[0].marker = slipped(by_m);
-    renderers.emplace_back(truth.camera, shafts_of(truth), tissue, with_noise(recording.noise));
-  }
-  const int count = recording.compressed ? 360 : 96;
-  KeyFrames frames(nominal, 0);
-  show(
-      count, recording.compressed ? 30 : 8, recording.compressed,
-      [&](int i) {
-        const double part = static_cast<double>(i) / count, turn = part < 0.5 ? 2 * part : 2 - 2 * part;
-        JointVector q = swinging(nominal, 0, recording.seed);
-        q.theta_rad = 0.02 * std::sin(6 * part), q.phi_rad = 1.57 + 0.02 * std::cos(9 * part);
-        q.psi_rad = -3 + 1.05 * two_pi * turn;
-        return renderers[part < 0.5 ? 0 : 1].render({placement_of(nominal.instruments[0], q)},
-                                                    1000 * recording.seed + static_cast<std::uint64_t>(i));
-      },
-      [&](const cv::Mat& bgr, double time_s) { frames.add(bgr, time_s); });
-  const MarkerCalibration found = calibrate_marker(nominal, 0, frames.take());
+  const MarkerCalibration found = calibration_of_marker(recording, nominal, slipped(0), slipped(slip_m));
   if (!found.refusal.empty()) return {found.refusal, {}};
   const Marker& is = found.marker;
   const Marker expected = slipped(slip_m / 2);

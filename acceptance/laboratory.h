@@ -8,13 +8,17 @@
 
 #include <opencv2/core.hpp>
 
+#include "lapservo/calibration/camera/camera_calibration.h"
+#include "lapservo/calibration/marker/marker_calibration.h"
 #include "lapservo/calibration/recording/joint_recording.h"
 #include "lapservo/calibration/registration/timed_pose.h"
+#include "lapservo/core/angles.h"
 #include "lapservo/core/random.h"
 #include "lapservo/geometry/rotation.h"
 #include "lapservo/io/frame_source.h"
 #include "lapservo/io/video/video_writer.h"
 #include "lapservo/rig/joint_conversion.h"
+#include "lapservo/sim/boards.h"
 #include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/renderer.h"
 #include "lapservo/sim/tissue.h"
@@ -94,6 +98,62 @@ inline void show(int count, double fps, bool compressed, const std::function<cv:
   while (const auto frame = source->next()) look(frame->bgr, frame->time_s);
 }
 
+// By twelve pictures of a board: of a camera that may be another one in each, changed before they are looked at.
+inline CameraCalibration calibration_of_camera(
+    const Recording& recording,
+    const std::function<Camera(std::size_t, Camera)>& camera = [](std::size_t, Camera c) { return c; },
+    const std::function<cv::Mat(std::size_t, const cv::Mat&)>& image = [](std::size_t,
+                                                                          const cv::Mat& bgr) { return bgr; }) {
+  constexpr int views = 12;
+  const Board board{9, 6, 0.005};
+  const Camera truth = laboratory(recording.seed).camera;
+  BoardScene scene;
+  scene.noise *= recording.noise;
+  BoardViews shown(board, views);
+  const auto poses = board_poses(scene, truth, views, 100 * recording.seed);
+  for (std::size_t i = 0; i < poses.size(); ++i)
+    shown.add(std::to_string(i), image(i, render_board(scene, camera(i, truth), poses[i], 1000 * recording.seed + i)),
+              true);
+  return calibrate_camera(board, shown.take(), {});
+}
+
+// Every boundary off by up to 0.25 mm, at either edge by itself; half of the prints with a gap.
+inline Marker cut_by_hand(const Marker& nominal, std::uint64_t seed) {
+  Random random(seed);
+  PrintShape shape = PrintShape::of(nominal);
+  const auto off_m = [&] { return random.uniform(-0.25e-3, 0.25e-3); };
+  for (std::size_t k = 1; k < 4; ++k) shape.upper_m[k] += off_m();
+  for (std::size_t k = 0; k < 4; ++k) shape.lower_m[k] += off_m();
+  shape.gap_rad = random.uniform() < 0.5 ? 0 : 0.8e-3 / nominal.radius_m();
+  return shape.on(nominal);
+}
+
+// By a turn there and back, between which the marker may change, with the rig that is believed.
+inline MarkerCalibration calibration_of_marker(const Recording& recording, const Rig& believed, const Marker& there,
+                                               const Marker& back) {
+  Rig truth = laboratory(recording.seed);
+  const cv::Mat tissue = make_tissue(truth.camera.width_px, truth.camera.height_px, recording.seed);
+  std::vector<Renderer> renderers;
+  for (const Marker& marker : {there, back}) {
+    truth.instruments[0].marker = marker;
+    renderers.emplace_back(truth.camera, shafts_of(truth), tissue, with_noise(recording.noise));
+  }
+  const int count = recording.compressed ? 360 : 96;
+  KeyFrames frames(believed, 0);
+  show(
+      count, recording.compressed ? 30 : 8, recording.compressed,
+      [&](int i) {
+        const double part = static_cast<double>(i) / count, turn = part < 0.5 ? 2 * part : 2 - 2 * part;
+        JointVector q = swinging(truth, 0, recording.seed);
+        q.theta_rad = 0.02 * std::sin(6 * part), q.phi_rad = 1.57 + 0.02 * std::cos(9 * part);
+        q.psi_rad = -3 + 1.05 * two_pi * turn;
+        return renderers[part < 0.5 ? 0 : 1].render({placement_of(truth.instruments[0], q)},
+                                                    1000 * recording.seed + static_cast<std::uint64_t>(i));
+      },
+      [&](const cv::Mat& bgr, double time_s) { frames.add(bgr, time_s); });
+  return calibrate_marker(believed, 0, frames.take());
+}
+
 struct Swing {
   Rig truth;
   std::vector<TimedPose> poses{};
@@ -117,18 +177,16 @@ inline JointRecording readings_of(const Rig& truth, double seconds, std::uint64_
   return joints;
 }
 
-// `believed_focal`: of the camera by which the poses are found, in focal lengths of the true one.
-inline Swing swing(const Recording& recording, double believed_focal = 1) {
+// `believed`: the camera and the marker by which the poses are found.
+inline Swing swing(const Recording& recording, const Rig& truth, const Rig& believed) {
   constexpr double seconds = 12.5;
-  Swing result{laboratory(recording.seed)};
-  const Rig& truth = result.truth;
+  Swing result{truth};
   const double fps = recording.compressed ? 30 : 8;
   Renderer renderer(truth.camera, shafts_of(truth),
                     make_tissue(truth.camera.width_px, truth.camera.height_px, recording.seed),
                     with_noise(recording.noise));
-  Rig free = truth;
+  Rig free = believed;
   free.instruments[0].camera_from_rcm.reset();
-  free.camera.fx_px *= believed_focal, free.camera.fy_px *= believed_focal;
   Tracker tracker(free, {.frame_budget = std::nullopt});
   show(
       static_cast<int>(seconds * fps), fps, recording.compressed,
@@ -142,6 +200,14 @@ inline Swing swing(const Recording& recording, double believed_focal = 1) {
       });
   result.joints = readings_of(truth, seconds, recording.seed);
   return result;
+}
+
+// `believed_focal`: in focal lengths of the true camera.
+inline Swing swing(const Recording& recording, double believed_focal = 1) {
+  const Rig truth = laboratory(recording.seed);
+  Rig believed = truth;
+  believed.camera.fx_px *= believed_focal, believed.camera.fy_px *= believed_focal;
+  return swing(recording, truth, believed);
 }
 
 }  // namespace lapservo::laboratories
