@@ -98,7 +98,7 @@ inline void show(int count, double fps, bool compressed, const std::function<cv:
   while (const auto frame = source->next()) look(frame->bgr, frame->time_s);
 }
 
-// By twelve pictures of a board: of a camera that may be another one in each, changed before they are looked at.
+// Calibrates by twelve images of a board. The camera may differ from image to image, and an image may be changed.
 inline CameraCalibration calibration_of_camera(
     const Recording& recording,
     const std::function<Camera(std::size_t, Camera)>& camera = [](std::size_t, Camera c) { return c; },
@@ -128,7 +128,7 @@ inline Marker cut_by_hand(const Marker& nominal, std::uint64_t seed) {
   return shape.on(nominal);
 }
 
-// By a turn there and back, between which the marker may change, with the rig that is believed.
+// Calibrates a rig by a turn there and back. The true marker may change in between.
 inline MarkerCalibration calibration_of_marker(const Recording& recording, const Rig& believed, const Marker& there,
                                                const Marker& back) {
   Rig truth = laboratory(recording.seed);
