@@ -98,7 +98,7 @@ class Advisor {
       add(true,
           fmt::format("{} is dark: its values reach {:.0f} of 255", where,
                       f_.light ? f_.light->value : f_.picture.value),
-          "raise the light or the exposure, come nearer, and record again",
+          "take the cap off the lens, raise the light or the exposure, come nearer, and record again",
           "sigma falls as the light rises; all other numbers here count only then");
   }
 
