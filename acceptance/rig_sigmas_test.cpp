@@ -265,6 +265,8 @@ TEST(RigSigmas, OfALaboratorysOwnCalibrationsAreInQ) {
   EXPECT_GE(row.told, 0.95 * row.frames);
   EXPECT_LT(row.q.worst(), 4.5);
   EXPECT_LT(pose.worst(), 4.5);
+  row.q.expect(0.2, 1.4);
+  pose.expect(0.2, 1.4);
 }
 
 }  // namespace

@@ -230,14 +230,14 @@ void Fitter::count_turn(const Expected& expected) {
 
 CommonErrors Fitter::errors_of(const ResidualLines& lines) const {
   CommonErrors errors = common_errors(pass_, lines, fit_.blur, processed_, fit_.bias_px, departure_px());
-  if (!has_sigmas(scene_.camera)) return errors;
+  if (!has_sigmas(scene_.camera, scene_.marker)) return errors;
   std::array<double, 4> by_exponent_px{};
   // An exponent that the image shows has a sigma of its own.
   if (scene_.camera.response.sigma && fit_.departure.exponent == 1) {
     const DepartedLight seen(light_, fit_.departure);
     by_exponent_px = moved_by_exponent_px(seen.light(), pass_.all, located_with_.boundaries_px());
   }
-  errors.rig = RigErrors(scene_.camera, by_exponent_px);
+  errors.rig = RigErrors(scene_.camera, scene_.marker, by_exponent_px);
   return errors;
 }
 
