@@ -26,8 +26,9 @@ bool all_finite(const ImageMeasurement& image) {
   return std::isfinite(image.time_s) &&
          (!image.found || (image.features.allFinite() && image.covariance.allFinite() && image.ends_px.allFinite() &&
                            (!image.q || image.q->allFinite()))) &&
-         (!image.camera_from_marker || (image.camera_from_marker->translation.allFinite() &&
-                                        image.camera_from_marker->rotation.coeffs().allFinite()));
+         (!image.camera_from_marker ||
+          (image.camera_from_marker->translation.allFinite() &&
+           image.camera_from_marker->rotation.coeffs().allFinite() && image.ends_px.allFinite()));
 }
 
 }  // namespace

@@ -115,7 +115,7 @@ class EndoscopeRecovery {
   std::optional<endoscope::Measured> measured_;  ///< at the latest image
   std::optional<SeenJoints> seen_joints_;        ///< in it, by the registration that the loop goes by
   double joints_s_ = 0, joints_from_s_ = 0;      ///< when the joints were read last, and first after the last silence
-  OffsetSteps steps_;                            ///< of images that showed q
+  OffsetSteps steps_;                            ///< of images that show the marker
   int registration_of_steps_ = 0;
   GapPath path_;                                       ///< since the offset that is trusted
   Eigen::Vector4d trusted_ = Eigen::Vector4d::Zero();  ///< offset, of before the endoscope moved

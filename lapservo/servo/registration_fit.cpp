@@ -33,10 +33,6 @@ ArmHypothesis small_offsets() {
   return hypothesis;
 }
 
-Rigid3 marker_from_unrolled(const Marker& marker) {
-  return camera_from_marker(marker, {}, 0).inverse();
-}
-
 std::optional<Edges> edges_of(const Camera& camera, const Marker& marker, const Rigid3& camera_from_unrolled) {
   const auto line = centre_line(camera, marker, camera_from_unrolled, 0);
   if (!line) return std::nullopt;
@@ -46,19 +42,18 @@ std::optional<Edges> edges_of(const Camera& camera, const Marker& marker, const 
 }
 
 // Zero of a marker that is not in view.
-Eigen::Matrix<double, 6, 6> whitening_of(const Camera& camera, const Marker& marker, const Rigid3& camera_from_marker) {
+Eigen::Matrix<double, 6, 6> whitening_by_edges(const Camera& camera, const Marker& marker, const Rigid3& seen) {
   constexpr double step = 1e-6;
-  const Rigid3 unrolled = marker_from_unrolled(marker);
-  const auto moved = [&](int i, double by) {
-    Eigen::Matrix<double, 6, 1> change = by * Eigen::Matrix<double, 6, 1>::Unit(i);
-    return edges_of(camera, marker,
-                    Rigid3{rotation_by(change.tail<3>()) * camera_from_marker.rotation,
-                           camera_from_marker.translation + change.head<3>()} *
-                        unrolled);
+  const Rigid3 marker_from_unrolled = camera_from_marker(marker, {}, 0).inverse();
+  const auto moved = [&](const Eigen::Matrix<double, 6, 1>& by) {
+    const Rigid3 pose{rotation_by(by.tail<3>()) * seen.rotation, seen.translation + by.head<3>()};
+    return edges_of(camera, marker, pose * marker_from_unrolled);
   };
+  const auto at = moved(Eigen::Matrix<double, 6, 1>::Zero());
   Eigen::Matrix<double, 8, 6> slopes;
   for (int i = 0; i < 6; ++i) {
-    const auto at = moved(i, 0), more = moved(i, step), less = moved(i, -step);
+    const Eigen::Matrix<double, 6, 1> by = step * Eigen::Matrix<double, 6, 1>::Unit(i);
+    const auto more = moved(by), less = moved(-by);
     if (!at || !more || !less) return Eigen::Matrix<double, 6, 6>::Zero();
     const Edges up = *more - *at, down = *at - *less;  // over the seam the inner boundaries jump
     slopes.col(i) = (up.squaredNorm() < down.squaredNorm() ? up : down) / (step * sigma_px);
@@ -79,7 +74,8 @@ std::optional<SeenJoints> seen_joints(const Camera& camera, const Instrument& in
                                       const MarkerSighting& sighting, const Eigen::Vector4d& offset) {
   constexpr int iterations = 3;
   constexpr double step = 1e-6;
-  const Eigen::Matrix<double, 6, 6> whitening = whitening_of(camera, instrument.marker, sighting.camera_from_marker);
+  const Eigen::Matrix<double, 6, 6> whitening =
+      whitening_by_edges(camera, instrument.marker, sighting.camera_from_marker);
   const auto errors = [&](const Eigen::Vector4d& at) -> Eigen::Matrix<double, 6, 1> {
     const auto q = JointVector::from_vector(sighting.q + at);
     const Rigid3 unrolled = *instrument.camera_from_rcm * rcm_from_unrolled(q);
@@ -105,7 +101,7 @@ std::optional<RegistrationFit> fit_registration(const Camera& camera, const Mark
   ArmData data{marker, camera_from_rcm_by(marker, sightings.back()), sightings, {}, loss_sigmas, 1 / alike_images,
                path};
   for (const MarkerSighting& one : sightings)
-    data.whitening.push_back(whitening_of(camera, marker, one.camera_from_marker));
+    data.whitening.push_back(whitening_by_edges(camera, marker, one.camera_from_marker));
   const auto found = fit_arm(data, small_offsets());
   if (!found) return std::nullopt;
   const double px = sigma_px / std::sqrt(8.0);

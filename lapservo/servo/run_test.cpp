@@ -403,13 +403,17 @@ void expect_right_where_ok(const PastRun& done, double latency_s, double period_
   }
 }
 
+std::vector<Blotch> blood() {
+  return {{0.5, 0.012, 0.002}, {2.5, 0.02, 0.0015}, {4.5, 0.03, 0.002}, {5.5, 0.008, 0.0015}};
+}
+
 // Images with motion in them: dark for a while; and blurred, veiled, stained and dark at once.
 TEST(Run, IsNeverWrongByPicturesThatAreHardToRead) {
   Case darkened;
   darkened.dark = Interval{2, 2.6};
   Case all = darkened;
   all.exposure_s = 0.015, all.smoke = 0.35F;
-  all.blotches = {{0.5, 0.012, 0.002}, {2.5, 0.02, 0.0015}, {4.5, 0.03, 0.002}, {5.5, 0.008, 0.0015}};
+  all.blotches = blood();
   const ControllerConfig controller = config_of(testing::small_test_rig(), all).controller;
   for (Case c : {darkened, all}) {
     SCOPED_TRACE(::testing::Message() << c.exposure_s << " " << c.smoke << " " << c.blotches.size());
@@ -599,38 +603,21 @@ TEST(Run, HoldsAnEndoscopeThatMovesSmoothlyAsSoonAsThatIsPlain) {
 // Late and lost images, play, registrations that are 0.9 to 10 mm off, blur, smoke, blood: nothing moved.
 std::vector<std::pair<const char*, std::function<void(SimulatorConfig&)>>> resting() {
   using Config = SimulatorConfig;
-  const std::vector<Blotch> blood{{0.5, 0.012, 0.002}, {2.5, 0.02, 0.0015}, {4.5, 0.03, 0.002}, {5.5, 0.008, 0.0015}};
+  const auto play = [](const Eigen::Vector4d& widths) { return [=](Config& c) { c.arm.backlash = widths; }; };
+  const auto rcm_off = [](const Eigen::Vector3d& by_m) { return [=](Config& c) { c.arm.rcm_offset_m = by_m; }; };
   return {{"as it is", [](Config&) {}},
           {"jitter 4 ms", [](Config& c) { c.endoscope.jitter_s = 0.004; }},
           {"jitter 8 ms", [](Config& c) { c.endoscope.jitter_s = 0.008; }},
           {"a tenth lost", [](Config& c) { c.endoscope.dropped_fraction = 0.1; }},
-          {"play of rho, psi",
-           [](Config& c) {
-             c.arm.backlash = {0, 0, 8e-4, 0.03};
-           }},
-          {"play of all",
-           [](Config& c) {
-             c.arm.backlash = {1e-3, 1e-3, 8e-4, 0.03};
-           }},
-          {"RCM 0.9 mm off",
-           [](Config& c) {
-             c.arm.rcm_offset_m = {0.0005, -0.0005, 0.0005};
-           }},
-          {"RCM 1.7 mm off",
-           [](Config& c) {
-             c.arm.rcm_offset_m = {-0.001, 0.001, 0.001};
-           }},
-          {"RCM 5 mm off",
-           [](Config& c) {
-             c.arm.rcm_offset_m = {0.003, -0.003, 0.003};
-           }},
-          {"RCM 10 mm off",
-           [](Config& c) {
-             c.arm.rcm_offset_m = {-0.006, 0.006, 0.006};
-           }},
+          {"play of rho, psi", play({0, 0, 8e-4, 0.03})},
+          {"play of all", play({1e-3, 1e-3, 8e-4, 0.03})},
+          {"RCM 0.9 mm off", rcm_off({0.0005, -0.0005, 0.0005})},
+          {"RCM 1.7 mm off", rcm_off({-0.001, 0.001, 0.001})},
+          {"RCM 5 mm off", rcm_off({0.003, -0.003, 0.003})},
+          {"RCM 10 mm off", rcm_off({-0.006, 0.006, 0.006})},
           {"exposure 15 ms", [](Config& c) { c.endoscope.exposure_s = 0.015; }},
           {"smoke", [](Config& c) { c.render.smoke = 0.35F; }},
-          {"blood", [blood](Config& c) { c.blotches = blood; }},
+          {"blood", [](Config& c) { c.blotches = blood(); }},
           {"latency 0.2 s", [](Config& c) { c.endoscope.latency_s = 0.2; }}};
 }
 

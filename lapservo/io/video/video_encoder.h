@@ -16,7 +16,7 @@ std::string video_remark();
 
 enum class VideoUse {
   shown,     ///< 4:2:0, which browsers play; 4:4:4 where the width or height is odd
-  measured,  ///< 4:4:4 at a finer quality, ten times the size: colour boundaries stay where they are
+  measured,  ///< 4:4:4 at a finer quality, several times the size: colour boundaries stay where they are
 };
 
 /// A video file while it is written, by FFmpeg's libraries: H.264 (libx264) in Rec. 601's limited range, with 4:2:0

@@ -126,6 +126,7 @@ void add_pulls_of_camera(std::span<const Measurement> measurements, const Residu
     }
   }
   for (CameraPull& pull : pulls) {
+    if (pull.x.isZero(0)) continue;  // the rig has no sigma of it
     pull.error_px = 1;
     sums.camera.push_back(pull);
   }

@@ -35,10 +35,11 @@ class RunWatcher : public RunObserver {
   const std::string& state() const { return state_; }
   bool is_new_state() const { return is_new_state_; }
 
+  const ServoOptions& options_;
+
  private:
   bool ends_by_page(const ControlTick& tick, double time_s);
 
-  const ServoOptions& options_;
   std::unique_ptr<RunFolder> folder_;
   Supervisor* arm_;
   ServoPage* page_;

@@ -66,7 +66,6 @@ class ArmWatcher : public RunWatcher {
   ArmWatcher(const ServoOptions& options, std::unique_ptr<RunFolder> folder, Supervisor& arm, ServoPage* page,
              const RunConfig& run, const CrtkRobot& robot, LiveImages& images, LoopTopics& topics, Goal& goal)
       : RunWatcher(options, std::move(folder), &arm, page),
-        options_(options),
         run_(run),
         arm_(arm),
         robot_(robot),
@@ -150,7 +149,6 @@ class ArmWatcher : public RunWatcher {
     say(time_s, "would send " + list_of(*run_.rig.instruments.front().joints, *set_point) + " (--enable-motion does)");
   }
 
-  const ServoOptions& options_;
   const RunConfig& run_;
   Supervisor& arm_;
   const CrtkRobot& robot_;
