@@ -48,7 +48,7 @@ TEST(Observation, EveryStatusHasAWordOfItsOwn) {
   std::set<std::string_view> words;
   for (const Status status :
        {Status::ok, Status::no_marker, Status::cut, Status::occluded, Status::ambiguous, Status::poor_fit,
-        Status::uncertain, Status::marker_mismatch, Status::damaged, Status::interlaced}) {
+        Status::uncertain, Status::marker_mismatch, Status::damaged, Status::interlaced, Status::blended}) {
     const std::string_view word = to_string(status);
     EXPECT_FALSE(word.empty());
     EXPECT_EQ(word.find_first_of(" ,\"\n"), std::string_view::npos) << word;

@@ -6,7 +6,7 @@ namespace lapservo {
 using namespace internal;
 namespace {
 
-constexpr Words<Status, 10> status_words{{{Status::ok, "ok"},
+constexpr Words<Status, 11> status_words{{{Status::ok, "ok"},
                                           {Status::no_marker, "no_marker"},
                                           {Status::cut, "cut"},
                                           {Status::occluded, "occluded"},
@@ -15,8 +15,9 @@ constexpr Words<Status, 10> status_words{{{Status::ok, "ok"},
                                           {Status::uncertain, "uncertain"},
                                           {Status::marker_mismatch, "marker_mismatch"},
                                           {Status::damaged, "damaged"},
-                                          {Status::interlaced, "interlaced"}}};
-static_assert(names_all(status_words, Status::interlaced));
+                                          {Status::interlaced, "interlaced"},
+                                          {Status::blended, "blended"}}};
+static_assert(names_all(status_words, Status::blended));
 
 }  // namespace
 

@@ -16,6 +16,7 @@ enum class Status {
   marker_mismatch,  ///< the print is not as the rig says: calibrate the marker
   damaged,          ///< the decoder of the image or video complained: its pixels are not the camera's
   interlaced,       ///< the frame is made of two fields, of two moments: use --deinterlace
+  blended,          ///< the frame is the sum of two moments: noise reduction over time, or a converted frame rate
 };
 std::string_view to_string(Status status);
 

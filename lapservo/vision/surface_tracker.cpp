@@ -6,6 +6,7 @@
 
 #include "lapservo/core/angles.h"
 #include "lapservo/marker/azimuths.h"
+#include "lapservo/vision/accept/two_moments.h"
 #include "lapservo/vision/accept/verification.h"
 #include "lapservo/vision/colour/blob_search.h"
 #include "lapservo/vision/edges/blurred_edges.h"
@@ -24,6 +25,7 @@ SurfaceTracker::SurfaceTracker(const Rig& rig, bool single, std::optional<double
       channels_(rig.camera),
       memory_(rig.instruments.size()),
       prints_(rig.instruments.size()),
+      seen_before_(rig.instruments.size()),
       searches_(rig.instruments.size()),
       searched_beside_(rig.instruments.size()),
       found_(rig.instruments.size()),
@@ -38,6 +40,7 @@ SurfaceTracker::SurfaceTracker(const Rig& rig, bool single, std::optional<double
 
 void SurfaceTracker::forget(std::size_t i) {
   memory_[i].reset();
+  seen_before_[i] = {};
   searches_[i] = MarkerSearch();
   searched_beside_[i] = 0;
 }
@@ -45,6 +48,7 @@ void SurfaceTracker::forget(std::size_t i) {
 void SurfaceTracker::forget() {
   for (std::size_t i = 0; i < rig_.instruments.size(); ++i) forget(i);
   std::fill(prints_.begin(), prints_.end(), PrintRecord());
+  blended_s_.reset();
 }
 
 Scene SurfaceTracker::scene_of(const ImageView& image, std::size_t i) const {
@@ -186,12 +190,19 @@ const std::vector<Observation>& SurfaceTracker::track(const cv::Mat& image_bgr, 
     observations_[i] = {};
     observations_[i].status = found.status;
     if (found.refused) observations_[i] = refused_observation(found.status, *found.refused);
+    const auto before = seen_before_[i];
+    seen_before_[i] = {found.fit ? found.fit->unknowns.pose() : found.refused, before[0]};
     if (!found.fit) continue;
     const FineFit& fit = *found.fit;
     memory_[i] = remembered(memory_[i], fit, found.among_others, now_s_);
-    const bool is_off = !rig_.instruments[i].marker.bands_are_measured() && prints_[i].is_off();
-    observations_[i] = is_off ? refused_observation(Status::marker_mismatch, fit.unknowns.pose())
-                              : observation_of(scene_of(image, i), fit);
+    if (shows_two_moments(scene_of(image, i), fit, before)) blended_s_ = now_s_;
+    const bool is_blended = blended_s_ && now_s_ - *blended_s_ < two_moments_limits.told_for_s;
+    if (!rig_.instruments[i].marker.bands_are_measured() && prints_[i].is_off())
+      observations_[i] = refused_observation(Status::marker_mismatch, fit.unknowns.pose());
+    else if (is_blended)
+      observations_[i] = refused_observation(Status::blended, fit.unknowns.pose());
+    else
+      observations_[i] = observation_of(scene_of(image, i), fit);
   }
   return observations_;
 }

@@ -61,6 +61,8 @@ class SurfaceTracker {
   std::vector<std::optional<RcmPrior>> registrations_;
   std::vector<std::optional<InstrumentMemory>> memory_;
   std::vector<PrintRecord> prints_;
+  std::vector<std::array<std::optional<ShaftPose>, 2>> seen_before_;  // found or refused in the two frames before
+  std::optional<double> blended_s_;                                   // when a frame last showed two moments
   std::vector<MarkerSearch> searches_;
   bool followed_twice_ = false, followed_in_vain_ = false;  // in this frame, one of them
   std::vector<std::size_t> searched_beside_;                // so many others the search is among, by instrument

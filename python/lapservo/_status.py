@@ -14,6 +14,7 @@ class Status(Enum):
     marker_mismatch = "marker_mismatch"
     damaged = "damaged"
     interlaced = "interlaced"
+    blended = "blended"
 
 
 _MEANINGS = {
@@ -27,6 +28,7 @@ _MEANINGS = {
     "marker_mismatch": "the print is not as the rig says: calibrate the marker",
     "damaged": "the decoder of the image or video complained: its pixels are not the camera's",
     "interlaced": "the frame is made of two fields, of two moments: use deinterlace",
+    "blended": "the frame is the sum of two moments: noise reduction over time, or a converted frame rate",
 }
 for _status in Status:
     _status.__doc__ = _MEANINGS[_status.value]

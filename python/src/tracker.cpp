@@ -112,7 +112,7 @@ Observed observed_from(const py::tuple& state) {
 
 void bind_observation(py::module_& m) {
   std::vector<std::string> words;
-  for (int i = 0; i <= static_cast<int>(Status::interlaced); ++i) words.emplace_back(to_string(static_cast<Status>(i)));
+  for (int i = 0; i <= static_cast<int>(Status::blended); ++i) words.emplace_back(to_string(static_cast<Status>(i)));
   m.attr("_statuses") = words;
 
   using Pose = Observation::MarkerPose;

@@ -153,10 +153,11 @@ struct Tally {
     for (const auto& [name, count] : found) line += fmt::format(", {} in {}", name, count);
     return line;
   }
+  // Blending has frames refused for other reasons, too.
   void print_refused() const {
     for (const auto& [of, count] : refused)
       std::printf("  %s: %d %s: %s\n", of.first.c_str(), count, std::string(to_string(of.second)).c_str(),
-                  usual_cause(of.second));
+                  usual_cause(refused.contains({of.first, Status::blended}) ? Status::blended : of.second));
   }
   bool anything() const {
     return std::any_of(found.begin(), found.end(), [](const auto& entry) { return entry.second > 0; });

@@ -62,11 +62,12 @@ void FrameDiagnosis::add(const cv::Mat& bgr, const std::vector<Observation>& obs
     ++damaged_;
     return;
   }
-  bool any_ok = false, any_result = false, interlaced = false;
+  bool any_ok = false, any_result = false, interlaced = false, blended = false;
   for (std::size_t i = 0; i < observations.size(); ++i) {
     const Observation& observation = observations[i];
     Seen& seen = seen_[observation.instrument];
     interlaced |= observation.status == Status::interlaced;
+    blended |= observation.status == Status::blended;
     if (observation.status != Status::ok) {
       ++seen.refused[observation.status];
       continue;
@@ -82,6 +83,7 @@ void FrameDiagnosis::add(const cv::Mat& bgr, const std::vector<Observation>& obs
     seen.reversed += pose.beyond_m(camera_from_rcm->translation) < 0 ? 1 : 0;
   }
   interlaced_ += interlaced ? 1 : 0;
+  blended_ += blended ? 1 : 0;
   without_instrument_ += any_ok ? 0 : 1;
   if (!any_result) keep(bgr);
 }
@@ -130,6 +132,8 @@ std::string FrameDiagnosis::cause_in_frames(bool found_nowhere) const {
   if (kept_.empty()) return "";
   if (!deinterlaced_ && 2 * interlaced_ > frames_)
     return fmt::format("{} of {} frames are interlaced: --deinterlace tracks one field of each", interlaced_, frames_);
+  // Most frames of a blended recording are refused for what the blending does to them.
+  if (blended_ > 0) return fmt::format("{} of {} {}", blended_, frames_, usual_cause(Status::blended));
   std::vector<PictureLight> lights;
   std::transform(kept_.begin(), kept_.end(), std::back_inserter(lights), light_of_picture);
   if (std::all_of(lights.begin(), lights.end(), std::mem_fn(&PictureLight::dark))) return dark_pictures;

@@ -51,7 +51,7 @@ class FrameDiagnosis {
 
   Rig rig_;
   bool deinterlaced_;
-  int frames_ = 0, without_instrument_ = 0, interlaced_ = 0, damaged_ = 0;
+  int frames_ = 0, without_instrument_ = 0, interlaced_ = 0, blended_ = 0, damaged_ = 0;
   std::map<std::string, Seen> seen_;
   std::vector<cv::Mat> kept_;
   int without_result_ = 0;  ///< frames, some of which may show an instrument that misses the rig's RCM

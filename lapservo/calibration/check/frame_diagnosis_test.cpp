@@ -112,14 +112,17 @@ TEST_F(FrameDiagnosisTest, NamesTheBandsWhereThePrintIsAnother) {
   expect_names(text(other, [](cv::Mat&) {}), "its bands do not fit");
 }
 
-TEST_F(FrameDiagnosisTest, NamesDeinterlacing) {
-  FrameDiagnosis diagnosis(rig);
-  Observation interlaced;
-  interlaced.status = Status::interlaced;
-  interlaced.instrument = rig.instruments[0].name;
+TEST_F(FrameDiagnosisTest, NamesFramesOfTwoMoments) {
   const cv::Mat bgr(rig.camera.height_px, rig.camera.width_px, CV_8UC3, cv::Scalar(40, 90, 200));
-  for (int i = 0; i < frames; ++i) diagnosis.add(bgr, {interlaced});
-  expect_names(diagnosis.text(), "--deinterlace");
+  for (const auto& [status, remedy] :
+       {std::pair(Status::interlaced, "--deinterlace"), std::pair(Status::blended, "noise reduction over time")}) {
+    FrameDiagnosis diagnosis(rig);
+    Observation refused;
+    refused.status = status;
+    refused.instrument = rig.instruments[0].name;
+    for (int i = 0; i < frames; ++i) diagnosis.add(bgr, {refused});
+    expect_names(diagnosis.text(), remedy);
+  }
 }
 
 TEST_F(FrameDiagnosisTest, NamesFlawedFramesBeforeAllElse) {

@@ -29,6 +29,9 @@ const char* usual_cause(Status status) {
       return "the decoder reports damaged frames; repair what carries them, or record them again";
     case Status::interlaced:
       return "the frames are interlaced; --deinterlace tracks one field of each";
+    case Status::blended:
+      return "frames are the sum of two moments; switch off the recorder's noise reduction over time (3D NR, temporal "
+             "denoise) and every conversion of the frame rate";
   }
   return "";
 }
