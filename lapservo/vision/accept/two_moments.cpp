@@ -50,7 +50,7 @@ Boundaries boundaries_in_image(const Scene& scene, const ShaftPose& pose, int li
   return boundaries;
 }
 
-// What the image's values change by at a point along the shaft: means of so many pixels on both sides.
+// The change of the image's values along the shaft at a point: means of so many pixels on both sides.
 std::optional<Value> change_at(const Scene& scene, const BoundaryPoint& point, int pixels) {
   Value change = Value::Zero();
   for (int i = 1; i <= pixels; ++i)
@@ -98,7 +98,7 @@ float size_by(const Value& change, const Value& seen) {
   return seen.norm() / change.norm();
 }
 
-// What changes at other places, by what does at the boundaries: the median over the places that are so far away;
+// The change of values at other places by that at the boundaries: the median over the places that are so far away;
 // nullopt where these are few.
 template <class Ratio>
 std::optional<float> change_at(const Scene& scene, const Boundaries& boundaries, const Boundaries& places,

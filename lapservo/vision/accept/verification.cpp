@@ -1,6 +1,7 @@
 #include "lapservo/vision/accept/verification.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -58,8 +59,9 @@ Status validate_psi(const Scene& scene, const FineFit& fit) {
 
 }  // namespace
 
-ColourAgreement colour_agreement(const Scene& scene, const ShaftPose& pose) {
-  constexpr int azimuths = 13, places = 40;
+ColourAgreement colour_agreement(const Scene& scene, const ShaftPose& pose, const EdgeBlur& blur) {
+  constexpr int azimuths = 13, places = 40, places_beyond = 4;
+  constexpr double length_beyond = 0.04, blurs_beyond = 2;
   // About boundaries colours mix: so far, and at least this fraction of the length.
   constexpr double reach = 0.8, blurred_px = 1.5, min_guard = 0.02;
   const auto view = view_cylinder(pose.camera_from_unrolled, scene.marker.radius_m());
@@ -71,6 +73,7 @@ ColourAgreement colour_agreement(const Scene& scene, const ShaftPose& pose) {
   const double px_per_m = (scene.camera.raw_with_jacobian(middle).d_px_d_point * axis).norm();
   const double guard_m = std::max(min_guard * length_m, blurred_px / px_per_m);
   int total = 0, inside = 0, matching = 0, wrong = 0;
+  std::array<int, 2> beyond{}, going_on{};  // of both ends
   for (int i = 0; i < azimuths; ++i) {
     const double azimuth_rad = visible_azimuth_rad(*view, reach, i, azimuths);
     const double tau_rad = marker_azimuth_rad(scene.marker, azimuth_rad, pose.psi_rad);
@@ -78,6 +81,14 @@ ColourAgreement colour_agreement(const Scene& scene, const ShaftPose& pose) {
       continue;
     const auto ends_m = boundaries_m(scene.marker, tau_rad);
     const Eigen::Vector3d base = pose.camera_from_unrolled * surface_point(scene.marker.radius_m(), azimuth_rad, 0);
+    for (const std::size_t end : {0U, 1U})
+      for (int k = 0; k < places_beyond; ++k) {
+        const double blurred_m = blurs_beyond * blur.along_px[3 * end] / px_per_m;
+        const double away_m = std::max(guard_m, blurred_m) + length_beyond * length_m * (k + 0.5) / places_beyond;
+        const std::uint8_t colour =
+            scene.class_on_shaft(base + (end == 0 ? ends_m[0] - away_m : ends_m[3] + away_m) * axis);
+        beyond[end] += colour != Scene::outside, going_on[end] += colour == scene.bands[2 * end];
+      }
     for (int k = 0; k < places; ++k) {
       const double along_m = length_m * (k + 0.5) / places;
       const auto is_near = [&](double end_m) { return std::abs(end_m - along_m) < guard_m; };
@@ -91,15 +102,17 @@ ColourAgreement colour_agreement(const Scene& scene, const ShaftPose& pose) {
     }
   }
   const auto fraction = [](int part, int whole) { return whole ? static_cast<double>(part) / whole : 0; };
-  return {fraction(matching, inside), fraction(wrong, inside), fraction(inside, total)};
+  return {fraction(matching, inside), fraction(wrong, inside),
+          std::max(fraction(going_on[0], beyond[0]), fraction(going_on[1], beyond[1])), fraction(inside, total)};
 }
 
 Status validate(const Scene& scene, const FineFit& fit) {
   if (!fit.converged) return Status::poor_fit;
-  const ColourAgreement agreement = colour_agreement(scene, fit.unknowns.pose());
+  const ColourAgreement agreement = colour_agreement(scene, fit.unknowns.pose(), fit.blur);
   const bool is_cut = agreement.in_image < limits.wholly_in_image && scene.others.empty();
   if (!shows_enough(scene, agreement, fit)) return is_cut ? Status::cut : Status::occluded;
-  if (agreement.wrong > limits.max_wrong || !agrees_well(fit)) return Status::poor_fit;
+  if (agreement.wrong > limits.max_wrong || agreement.beyond > limits.max_beyond || !agrees_well(fit))
+    return Status::poor_fit;
   if (scene.registration && !fit.unknowns.through_rcm() && !fit.is_well_seen()) return Status::uncertain;
   return validate_psi(scene, fit);
 }

@@ -16,6 +16,7 @@ struct ValidationLimits {
   double wholly_in_image = 0.98;  ///< of the visible surface: what is missing is hidden, not cut
   double min_matching = 0.3;      ///< of the samples on the marker, with their band's colour
   double max_wrong = 0.05;        ///< of them, with another band's
+  double max_beyond = 0.5;        ///< of the samples just beyond an end, with the colour of its band
   int min_lines = 6;              ///< on which the inner boundaries are located, and the ends; without the RCM each end
   /// Of a boundary's lines in clear view: located on fewer, it is not where it should be.
   double missed_fraction = 0.3;
@@ -29,9 +30,10 @@ inline constexpr ValidationLimits validation_limits;
 struct ColourAgreement {
   double matching = 0;  ///< fraction of the samples inside the image that have the predicted colour
   double wrong = 0;     ///< fraction that has another of the marker's colours
+  double beyond = 0;    ///< of the samples just beyond an end, the fraction on which its band goes on; of the worse end
   double in_image = 0;  ///< fraction of the visible surface that lies inside the image
 };
-ColourAgreement colour_agreement(const Scene& scene, const ShaftPose& pose);
+ColourAgreement colour_agreement(const Scene& scene, const ShaftPose& pose, const EdgeBlur& blur = {});
 
 /// Whether a fit is good enough to move a robot by: Status::ok, or why not.
 Status validate(const Scene& scene, const FineFit& fit);

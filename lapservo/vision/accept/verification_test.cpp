@@ -39,6 +39,30 @@ TEST(Verification, ARightPoseIsOk) {
   }
 }
 
+// A fit that has an end amid its band, where nothing shows it, is of another pose.
+TEST(Verification, ABandThatGoesOnBeyondItsEndIsNotOk) {
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const Shot& shot = usual_shot(seed);
+    const ShaftPose pose = scenes::pose_of(shot.rig, 0, shot.q);
+    EXPECT_LT(colour_agreement(shot.sight.scene(), pose).beyond, 0.2);
+    for (const std::size_t band : {0U, 2U}) {
+      Rig shorter = shot.rig;
+      Marker& marker = shorter.instruments[0].marker;
+      for (auto* bands_m : {&marker.bands_upper_m, &marker.bands_lower_m}) (*bands_m)[band] -= 0.08 * marker.length_m();
+      ShaftPose begins_later = pose;
+      if (band == 0)
+        begins_later.camera_from_unrolled.translation =
+            pose.camera_from_unrolled * Eigen::Vector3d(0, 0, 0.08 * shot.rig.instruments[0].marker.length_m());
+      const Sight sight(shorter, shot.bgr);
+      EXPECT_GT(colour_agreement(sight.scene(), begins_later).beyond, validation_limits.max_beyond) << band;
+      FineFit fit = fit_from_truth(shot);
+      fit.unknowns = PoseUnknowns(begins_later, true);
+      EXPECT_EQ(validate(sight.scene(), fit), Status::poor_fit) << band;
+    }
+  }
+}
+
 // Started wrong, a fit may find back; what is called ok is right.
 TEST(Verification, WhatAWrongStartLeadsToIsRightOrNotOk) {
   int refused = 0;
