@@ -9,9 +9,9 @@
 #include <opencv2/core.hpp>
 
 #include "lapservo/calibration/fit/at_iteration.h"
+#include "lapservo/calibration/marker/marker_survey.h"
 #include "lapservo/calibration/marker/print_shape.h"
 #include "lapservo/rig/rig.h"
-#include "lapservo/vision/survey/marker_survey.h"
 
 namespace lapservo::internal {
 

@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "lapservo/calibration/fit/at_iteration.h"
+#include "lapservo/calibration/marker/marker_survey.h"
 #include "lapservo/calibration/marker/print_shape.h"
-#include "lapservo/vision/survey/marker_survey.h"
 
 namespace lapservo::internal {
 

@@ -7,13 +7,13 @@
 
 #include <opencv2/core.hpp>
 
+#include "lapservo/calibration/marker/seam_edges.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/vision/camera/camera_departure.h"
 #include "lapservo/vision/colour/blob_search.h"
 #include "lapservo/vision/colour/colour_classes.h"
 #include "lapservo/vision/model/fine_fit.h"
 #include "lapservo/vision/shaft/shaft_pose.h"
-#include "lapservo/vision/survey/seam_edges.h"
 
 namespace lapservo::internal {
 

@@ -1,4 +1,4 @@
-#include "lapservo/vision/survey/marker_survey.h"
+#include "lapservo/calibration/marker/marker_survey.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "lapservo/vision/survey/seam_edges.h"
+#include "lapservo/calibration/marker/seam_edges.h"
 
 #include <algorithm>
 #include <array>
