@@ -66,8 +66,10 @@ class CommandLine : public acceptance::ToolTest {
   }
 
 #ifdef LAPSERVO_TEST_BAGS
-  // in/run.bag and in/run, a bag of ROS 2: a folder's images as PNG, and joints, by a clock that is so far ahead.
-  void write_bags_of(const std::string& pictures, double fps, const CsvTable& joints, double arms_clock_s = 0) {
+  // in/run.bag and in/run, a bag of ROS 2: a folder's images as PNG, and joints, by a clock that is so far ahead; and
+  // what write_mcaps() writes.
+  void write_bags_of(const std::string& pictures, double fps, const CsvTable& joints, double arms_clock_s = 0,
+                     int most_images = 1000) {
     constexpr double begin_s = 1700000000;
     std::vector<lapservo::testing::BagEntry> ros1, ros2;
     const auto add = [&](const char* topic, const char* type, const auto& message, double recorded_s) {
@@ -86,7 +88,7 @@ class CommandLine : public acceptance::ToolTest {
       reading.stamp_s += arms_clock_s;
       add("/PSM1/measured_js", "sensor_msgs/JointState", reading, recorded_s);
     }
-    for (int i = 0; fs::exists(fmt::format("in/{}/{:04}.png", pictures, i)); ++i) {
+    for (int i = 0; i < most_images && fs::exists(fmt::format("in/{}/{:04}.png", pictures, i)); ++i) {
       const std::string png = read_file(fmt::format("in/{}/{:04}.png", pictures, i));
       add("/endoscope/image_raw/compressed", "sensor_msgs/CompressedImage",
           CompressedImageMessage{begin_s + i / fps, "png", {png.begin(), png.end()}}, begin_s + i / fps);
@@ -95,6 +97,28 @@ class CommandLine : public acceptance::ToolTest {
     fs::create_directories("in/run");
     lapservo::testing::write_ros2_bag("in/run/run_0.db3", ros2);
     lapservo::testing::write_ros2_metadata("in/run", {"run_0.db3"});
+    write_mcaps(ros2);
+  }
+  // The same messages in in/KIND.mcap, and in/split, which was split and not finished.
+  static void write_mcaps(const std::vector<lapservo::testing::BagEntry>& entries) {
+    using lapservo::testing::write_mcap;
+    for (const std::string kind : {"plain", "lz4", "zstd"})
+      write_mcap("in/" + kind + ".mcap", entries, {kind == "plain" ? "" : kind, 8, true, true});
+    write_mcap("in/unfinished.mcap", entries, {"lz4", 8, false, true});
+    fs::create_directories("in/split");
+    write_mcap("in/split/run_9.mcap", {entries.begin(), entries.end() - 40});
+    write_mcap("in/split/run_10.mcap", {entries.end() - 40, entries.end()}, {"zstd", 8, false, true});
+    for (const char* file : {"in/unfinished.mcap", "in/split/run_10.mcap"})
+      fs::resize_file(file, fs::file_size(file) - 60);  // what is behind the last chunk
+  }
+  static std::string results_of(const std::string& bag, const std::string& unregistered) {
+    expect_done("track " + bag + " --rig out/rig.yaml --out out/bag.csv");
+    expect_done("calibrate registration " + bag + " --rig " + unregistered + " --out out/bag.yaml");
+    std::string text = read_file("out/bag.csv") + read_file("out/bag.yaml");
+    expect_done("check " + bag + " --rig out/rig.yaml");
+    text += output();
+    for (std::size_t at = 0; (at = text.find(bag, at)) != std::string::npos;) text.replace(at, bag.size(), "BAG");
+    return text;
   }
   // Every number as in a run on the images themselves, except for the last digits of times.
   void expect_tracked_as(const std::string& observations, const std::string& bag, const std::string& rig) {
@@ -666,6 +690,12 @@ TEST_F(CommandLine, CalibrateRegistrationWritesWhereTheArmStands) {
       EXPECT_EQ(log.text(i, "action") + log.text(i, "reason"), decided.text(i, "action") + decided.text(i, "reason"))
           << i;
   }
+  // A part of it, in each kind of file.
+  fs::remove_all("in/run");
+  write_bags_of("swing", fps, CsvTable::read("in/joints.csv"), 0, 48);
+  const std::string of_db3 = results_of("in/run", unregistered);
+  for (const std::string bag : {"in/plain.mcap", "in/lz4.mcap", "in/zstd.mcap", "in/unfinished.mcap", "in/split"})
+    EXPECT_TRUE(results_of(bag, unregistered) == of_db3) << bag;
 #endif
 }
 

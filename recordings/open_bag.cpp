@@ -1,18 +1,12 @@
 #include "recordings/open_bag.h"
 
-#include <algorithm>
-#include <array>
 #include <filesystem>
-#include <fstream>
-#include <string_view>
 #include <system_error>
 
 #include "lapservo/core/error.h"
 #include "recordings/bag_endings.h"
-#ifdef LAPSERVO_ROS1_BAGS
+#ifdef LAPSERVO_BAGS
 #include "recordings/ros1_bag.h"
-#endif
-#ifdef LAPSERVO_ROS2_BAGS
 #include "recordings/ros2_bag.h"
 #endif
 
@@ -20,18 +14,13 @@ namespace lapservo::internal {
 namespace fs = std::filesystem;
 namespace {
 
-enum class BagKind { none, ros1, ros2, mcap, compressed };
+enum class BagKind { none, ros1, ros2, compressed };
 
 BagKind kind_of_file(const std::string& path) {
-  std::array<char, 16> begin{};
-  std::ifstream(path, std::ios::binary).read(begin.data(), begin.size());
-  const std::string_view text(begin.data(), begin.size());
-  if (text.starts_with("#ROSBAG ")) return BagKind::ros1;
-  if (text.starts_with("SQLite format 3")) return BagKind::ros2;
-  if (text.starts_with("\x89MCAP")) return BagKind::mcap;
-  if (ends_like(path, {".db3.zstd", ".mcap.zstd", ".bag.zst", ".db3.zst"})) return BagKind::compressed;
+  if (begins_like(path, "#ROSBAG ")) return BagKind::ros1;
+  if (begins_like(path, "SQLite format 3") || is_mcap(path)) return BagKind::ros2;
+  if (ends_like(path, {".db3.zstd", ".mcap.zstd", ".bag.zst", ".db3.zst", ".mcap.zst"})) return BagKind::compressed;
   if (ends_like(path, {".bag", ".bag.active"})) return BagKind::ros1;
-  if (ends_like(path, {".mcap"})) return BagKind::mcap;
   return ends_like(path, {".db3"}) ? BagKind::ros2 : BagKind::none;
 }
 
@@ -49,11 +38,6 @@ BagKind kind_of(const std::string& path) {
   return fs::is_regular_file(path, error) ? kind_of_file(path) : BagKind::none;
 }
 
-[[noreturn]] [[maybe_unused]] void refuse_missing(const std::string& path, const std::string& what,
-                                                  const std::string& packages) {
-  throw InputError(path, "is a " + what + ", which this build lacks: it was built without " + packages);
-}
-
 }  // namespace
 
 bool is_bag(const std::string& path) {
@@ -61,27 +45,17 @@ bool is_bag(const std::string& path) {
 }
 
 std::shared_ptr<const Bag> open_bag(const std::string& path) {
-  switch (kind_of(path)) {
-    case BagKind::ros1:
-#ifdef LAPSERVO_ROS1_BAGS
-      return open_ros1_bag(path);
+  const BagKind kind = kind_of(path);
+  if (kind == BagKind::none)
+    throw InputError(path, "is no bag, expected a ROS 1 bag, a ROS 2 bag's folder, a .db3 or an .mcap");
+  if (kind == BagKind::compressed)
+    throw InputError(path, "is compressed, expected a .db3 or .mcap: unpack it with `zstd -d`");
+#ifdef LAPSERVO_BAGS
+  if (kind == BagKind::ros1) return open_ros1_bag(path);
+  return open_ros2_bag(path);
 #else
-      refuse_missing(path, "ROS 1 bag", "libbz2-dev and liblz4-dev");
+  throw InputError(path, "is a bag, which this build lacks: it was built without all of " LAPSERVO_BAG_PACKAGES);
 #endif
-    case BagKind::ros2:
-#ifdef LAPSERVO_ROS2_BAGS
-      return open_ros2_bag(path);
-#else
-      refuse_missing(path, "ROS 2 bag", "libsqlite3-dev");
-#endif
-    case BagKind::mcap:
-      throw InputError(path, "is an MCAP recording, expected a .db3: convert it with `ros2 bag convert`");
-    case BagKind::compressed:
-      throw InputError(path, "is compressed, expected a .db3: unpack it with `zstd -d`");
-    case BagKind::none:
-      break;
-  }
-  throw InputError(path, "is no bag, expected a ROS 1 bag, a ROS 2 bag's folder or a .db3");
 }
 
 }  // namespace lapservo::internal

@@ -10,8 +10,8 @@ namespace lapservo::internal {
 /// Whether a file or folder is a bag by what it begins with, or means to be one by its name.
 bool is_bag(const std::string& path);
 
-/// A ROS 1 bag, a ROS 2 bag's folder or a .db3. Throws InputError for what is none, and for what this build lacks the
-/// libraries for.
+/// A ROS 1 bag, a ROS 2 bag's folder, a .db3 or an .mcap. Throws InputError for what is none, and for what this build
+/// lacks the libraries for.
 std::shared_ptr<const Bag> open_bag(const std::string& path);
 
 }  // namespace lapservo::internal

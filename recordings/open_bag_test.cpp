@@ -99,7 +99,8 @@ TEST(OpenBag, ReadsRos2sFilesAndFolders) {
   std::filesystem::create_directory(split);
   testing::write_ros2_bag(split / "bag_9.db3", {messages.begin(), messages.begin() + 3});
   testing::write_ros2_bag(split / "bag_10.db3", {messages.begin() + 3, messages.end()});
-  EXPECT_NE(input_error([&] { open_bag(split); }).find("has no metadata.yaml"), std::string::npos);
+  expect_entries(*open_bag(split));
+  EXPECT_EQ(open_bag(split)->remark(), "has no metadata.yaml: the times of its files decide their order");
   testing::write_ros2_metadata(split, {"bag_9.db3", "split/bag_10.db3"});
   ASSERT_TRUE(is_bag(split));
   expect_entries(*open_bag(split));
@@ -157,7 +158,9 @@ TEST(OpenBag, RefusesInOneLineWhatItCannotRead) {
   expect(refusal(file("empty.db3", "")), "is empty");
   expect(refusal(file("foreign.db3", "a text that is no database")), "can't be read as a ROS 2 bag");
   expect(refusal(file("packed.db3.zstd", "\x28\xb5\x2f\xfd")), "zstd -d");
-  expect(refusal(file("new.mcap", "\x89MCAP0")), "ros2 bag convert");
+  expect(refusal(file("short.mcap", "\x89MCAP0")), "is no MCAP recording");
+  expect(refusal(file("foreign.mcap", "a text that is no recording")), "is no MCAP recording");
+  expect(refusal(file("empty.mcap", "")), "is empty");
 
   const std::filesystem::path split = folder / "split";
   std::filesystem::create_directory(split);
@@ -167,7 +170,7 @@ TEST(OpenBag, RefusesInOneLineWhatItCannotRead) {
     return refusal(split);
   };
   using Files = std::vector<std::string>;
-  expect(with_metadata(Files{"bag_0.db3"}, "mcap"), "storage_identifier");
+  expect(with_metadata(Files{"bag_0.db3"}, "tape"), "storage_identifier: is tape");
   expect(with_metadata(Files{"bag_0.db3.zstd"}, "sqlite3", "zstd"), "compression_format: is zstd");
   expect(with_metadata(Files{"bag_0.db3", "bag_1.db3"}), "bag_1.db3: does not exist");
   expect(with_metadata(Files{}), "names no files");

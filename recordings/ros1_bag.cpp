@@ -1,25 +1,20 @@
 #include "recordings/ros1_bag.h"
 
 #include <algorithm>
-#include <bit>
 #include <cstring>
-#include <fstream>
 #include <map>
-#include <span>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "lapservo/core/error.h"
-#include "recordings/ros1_chunk.h"
+#include "recordings/chunk_compression.h"
+#include "recordings/file_bytes.h"
 #include "transports/ros1/ros1_decoder.h"
 
 namespace lapservo::internal {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "ROS 1 bags are little-endian, and so is what is copied");
-
-using ByteView = std::span<const std::uint8_t>;
 using Fields = std::map<std::string, std::string, std::less<>>;
 
 enum Op : std::uint8_t { message_op = 2, bag_op = 3, chunk_op = 5, chunk_info_op = 6, connection_op = 7 };
@@ -31,23 +26,6 @@ constexpr std::string_view magic = "#ROSBAG V2.0\n";
 }
 [[noreturn]] void refuse_damage(const std::string& path, std::uint64_t at) {
   refuse(path, fmt::format("is cut short or damaged at byte {}, expected a whole ROS 1 bag", at));
-}
-
-// The first of the bytes; nullopt where there are fewer.
-template <typename T>
-std::optional<T> taken(ByteView& from) {
-  if (from.size() < sizeof(T)) return std::nullopt;
-  T value;
-  std::memcpy(&value, from.data(), sizeof value);
-  from = from.subspan(sizeof value);
-  return value;
-}
-std::optional<ByteView> block_taken(ByteView& from) {
-  const auto size = taken<std::uint32_t>(from);
-  if (!size || *size > from.size()) return std::nullopt;
-  const ByteView block = from.first(*size);
-  from = from.subspan(*size);
-  return block;
 }
 
 std::optional<Fields> fields_of(ByteView header) {
@@ -85,39 +63,31 @@ bool is(const Fields& fields, Op op) {
 
 struct Record {
   Fields fields;
-  std::vector<std::uint8_t> data;
+  Bytes data;
 };
 
 // Records by their place in a file.
 class RecordFile {
  public:
-  explicit RecordFile(const std::string& path) : path_(path), file_(path, std::ios::binary) {
-    file_.seekg(0, std::ios::end);
-    if (!file_) throw InputError(path, "can't be read, expected a ROS 1 bag");
-    size_ = static_cast<std::uint64_t>(file_.tellg());
-  }
+  explicit RecordFile(const std::string& path) : file_(path, "a ROS 1 bag") {}
 
-  std::uint64_t size() const { return size_; }
-  std::vector<std::uint8_t> bytes(std::uint64_t at, std::uint64_t count) {
-    if (at > size_ || count > size_ - at) refuse_damage(path_, at);
-    std::vector<std::uint8_t> bytes(count);
-    file_.seekg(static_cast<std::streamoff>(at));
-    if (!file_.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(count)))
-      refuse_damage(path_, at);
-    return bytes;
+  std::uint64_t size() const { return file_.size(); }
+  Bytes bytes(std::uint64_t at, std::uint64_t count) {
+    auto bytes = file_.bytes(at, count);
+    if (!bytes) refuse_damage(file_.path(), at);
+    return std::move(*bytes);
   }
   /// Moves `at` behind it.
   Record record(std::uint64_t& at) {
     const std::uint64_t begin = at;
-    const auto header = block(at);
-    auto fields = fields_of(header);
-    if (!fields) refuse_damage(path_, begin);
+    auto fields = fields_of(block(at));
+    if (!fields) refuse_damage(file_.path(), begin);
     return {std::move(*fields), block(at)};
   }
 
  private:
-  std::vector<std::uint8_t> block(std::uint64_t& at) {
-    const auto length = bytes(at, 4);
+  Bytes block(std::uint64_t& at) {
+    const Bytes length = bytes(at, 4);
     ByteView from(length);
     const std::uint32_t size = *taken<std::uint32_t>(from);
     auto content = bytes(at + 4, size);
@@ -125,9 +95,7 @@ class RecordFile {
     return content;
   }
 
-  std::string path_;
-  std::ifstream file_;
-  std::uint64_t size_ = 0;
+  FileBytes file_;
 };
 
 struct Chunk {
@@ -171,8 +139,11 @@ class Ros1Messages : public BagMessages {
     Record record = file_.record(at);
     const auto size = number_in<std::uint32_t>(record.fields, "size");
     if (!is(record.fields, chunk_op) || !size) refuse_damage(path_, begin);
-    auto content = uncompressed_chunk(text_in(record.fields, "compression"), std::move(record.data), *size);
-    if (!content) refuse_damage(path_, begin);
+    const std::string compression = text_in(record.fields, "compression");
+    auto content = compression == "none"      ? std::optional(std::move(record.data))
+                   : *size <= most_of_a_chunk ? inflated(compression, record.data, *size)
+                                              : std::nullopt;
+    if (!content || content->size() != *size) refuse_damage(path_, begin);
     content_ = std::move(*content);
     rest_ = content_;
     return true;
@@ -183,7 +154,7 @@ class Ros1Messages : public BagMessages {
   std::vector<std::uint64_t> chunks_;
   RecordFile file_;
   std::size_t next_ = 0;
-  std::vector<std::uint8_t> content_;
+  Bytes content_;
   ByteView rest_;
   double recorded_s_ = 0;
 };
@@ -192,7 +163,6 @@ class Ros1Bag : public Bag {
  public:
   explicit Ros1Bag(const std::string& path) : path_(path) {
     RecordFile file(path);
-    if (file.size() == 0) throw InputError(path, "is empty, expected a ROS 1 bag");
     const auto begin = file.bytes(0, std::min<std::uint64_t>(file.size(), magic.size()));
     if (!std::equal(begin.begin(), begin.end(), magic.begin(), magic.end()))
       throw InputError(path, "is no ROS 1 bag of format 2.0: older ones can be converted by `rosbag fix`");

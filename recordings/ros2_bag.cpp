@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <limits>
 #include <map>
 #include <system_error>
 #include <utility>
@@ -11,44 +10,18 @@
 #include <fmt/ranges.h>
 
 #include "lapservo/core/error.h"
+#include "recordings/bag_endings.h"
+#include "recordings/ros2_file.h"
 #include "recordings/ros2_metadata.h"
-#include "recordings/sqlite_file.h"
 #include "transports/ros2/cdr_decoder.h"
 
 namespace lapservo::internal {
 namespace {
 namespace fs = std::filesystem;
 
-// One file of a bag, and which of its numbers a topic (name, type) has.
 struct Part {
-  SqliteFile file;
-  std::map<std::pair<std::string, std::string>, std::int64_t> numbers;
-};
-
-class Ros2Messages : public BagMessages {
- public:
-  Ros2Messages(const std::vector<Part>& parts, const BagTopic& topic) : parts_(parts), topic_(topic) {}
-
-  std::optional<BagMessage> next() override {
-    while (!rows_ || !rows_->next()) {
-      rows_.reset();  // a query that runs past its end restarts
-      if (next_ == parts_.size()) return std::nullopt;
-      const Part& part = parts_[next_++];
-      const auto number = part.numbers.find({topic_.name, topic_.type});
-      if (number == part.numbers.end()) continue;
-      rows_ = part.file.rows(
-          fmt::format("SELECT data, timestamp FROM messages WHERE topic_id = {} ORDER BY id", number->second));
-    }
-    return decode_bag_message(
-        topic_.type, []<typename Message>(const auto& bytes) { return decode_cdr<Message>(bytes); }, rows_->blob(0));
-  }
-  double recorded_s() const override { return 1e-9 * static_cast<double>(rows_->integer(1)); }
-
- private:
-  const std::vector<Part>& parts_;
-  BagTopic topic_;
-  std::size_t next_ = 0;
-  std::optional<SqliteFile::Rows> rows_;
+  std::string path;
+  std::unique_ptr<Ros2File> file;
 };
 
 // sensor_msgs/msg/Image is ROS 1's sensor_msgs/Image.
@@ -57,80 +30,93 @@ std::string type_as_in_ros1(std::string type) {
   return type;
 }
 
-std::string remark_on(const std::vector<fs::path>& unlisted) {
-  if (unlisted.empty()) return {};
-  std::vector<std::string> names;
-  for (const fs::path& file : unlisted) names.push_back(file.filename().string());
-  return fmt::format("metadata.yaml does not list {}: not read; `ros2 bag reindex` lists all files",
-                     fmt::join(names, ", "));
-}
+// The messages of a topic named as in ROS 1, file after file.
+class Ros2Messages : public BagMessages {
+ public:
+  Ros2Messages(const std::vector<Part>& parts, bool by_time, const BagTopic& topic) : topic_(topic) {
+    for (const Part& part : parts)
+      for (const Ros2FileTopic& one : part.file->topics())
+        if (one.name == topic.name && type_as_in_ros1(one.type) == topic.type && one.messages > 0) {
+          if (one.format != "cdr")
+            throw InputError(part.path, "serialization_format of " + one.name, one.format,
+                             "cdr: convert it with `ros2 bag convert`");
+          if (from_.empty() || from_.back().file != part.file.get() || from_.back().type != one.type)
+            from_.push_back({part.file.get(), one.type, one.first_ns});
+        }
+    if (by_time)
+      std::stable_sort(from_.begin(), from_.end(),
+                       [](const From& a, const From& b) { return a.first_ns < b.first_ns; });
+  }
+
+  std::optional<BagMessage> next() override {
+    while (!messages_ || !messages_->next()) {
+      messages_.reset();
+      if (next_ == from_.size()) return std::nullopt;
+      messages_ = from_[next_].file->messages(topic_.name, from_[next_].type);
+      ++next_;
+    }
+    return decode_bag_message(
+        topic_.type, []<typename Message>(const auto& bytes) { return decode_cdr<Message>(bytes); },
+        messages_->bytes());
+  }
+  double recorded_s() const override { return 1e-9 * static_cast<double>(messages_->recorded_ns()); }
+
+ private:
+  struct From {
+    const Ros2File* file = nullptr;
+    std::string type;  // as it is named there
+    std::uint64_t first_ns = 0;
+  };
+
+  BagTopic topic_;
+  std::vector<From> from_;
+  std::size_t next_ = 0;
+  std::unique_ptr<Ros2FileMessages> messages_;
+};
 
 class Ros2Bag : public Bag {
  public:
   explicit Ros2Bag(const std::string& path) : path_(path) {
     std::error_code error;
-    if (fs::is_directory(path, error)) {
-      const auto [listed, unlisted] = files_of_ros2_bag(path);
-      for (const fs::path& file : listed) add(file.string());
-      remark_ = remark_on(unlisted);
-    } else {
-      add(path);
+    const Ros2BagFiles files = fs::is_directory(path, error) ? files_of_ros2_bag(path) : Ros2BagFiles{{path}, {}, {}};
+    std::vector<std::string> remarks;
+    if (!files.remark.empty()) remarks.push_back(files.remark);
+    for (const fs::path& file : files.files) {
+      parts_.push_back({file, is_mcap(file) ? open_mcap_file(file) : open_db3_file(file)});
+      if (std::string remark = parts_.back().file->remark(); !remark.empty()) remarks.push_back(std::move(remark));
     }
-    for (const auto& [names, counted] : counts_)
-      topics_.push_back({names.first, names.second, counted.messages,
-                         counted.messages > 0
-                             ? 1e-9 * (static_cast<double>(counted.last_ns) - static_cast<double>(counted.first_ns))
-                             : 0});
+    by_time_ = files.is_unordered;
+    remark_ = fmt::format("{}", fmt::join(remarks, "; "));
+    list_topics();
   }
 
   const std::string& path() const override { return path_; }
   const std::vector<BagTopic>& topics() const override { return topics_; }
   std::string remark() const override { return remark_; }
   std::unique_ptr<BagMessages> messages(const BagTopic& topic) const override {
-    return std::make_unique<Ros2Messages>(parts_, topic);
+    return std::make_unique<Ros2Messages>(parts_, by_time_, topic);
   }
 
  private:
-  struct Counted {
-    std::uint64_t messages = 0;
-    std::int64_t first_ns = std::numeric_limits<std::int64_t>::max(), last_ns = 0;
-  };
-
-  void add(const std::string& file) {
-    std::error_code error;
-    if (fs::file_size(file, error) == 0 && !error) throw InputError(file, "is empty, expected a ROS 2 bag's .db3");
-    Part part{SqliteFile(file), {}};
-    if (auto tables = part.file.rows(
-            "SELECT count(*) FROM sqlite_master WHERE type = 'table' AND name IN ('topics', 'messages')");
-        !tables.next() || tables.integer(0) != 2)
-      throw InputError(file, "is no ROS 2 bag (no tables `topics` and `messages`)");
-    for (auto rows = part.file.rows("SELECT id, name, type, serialization_format FROM topics"); rows.next();) {
-      const std::pair names(rows.text(1), type_as_in_ros1(rows.text(2)));
-      if (const std::string format = rows.text(3); format != "cdr")
-        throw InputError(file, "serialization_format of " + names.first, format,
-                         "cdr: convert it with `ros2 bag convert`");
-      part.numbers[names] = rows.integer(0);
-      counts_[names];
-    }
-    count(part);
-    parts_.push_back(std::move(part));
-  }
-  void count(const Part& part) {
-    for (auto rows = part.file.rows(
-             "SELECT topic_id, count(*), min(timestamp), max(timestamp) FROM messages GROUP BY topic_id");
-         rows.next();)
-      for (const auto& [names, number] : part.numbers)
-        if (number == rows.integer(0)) {
-          Counted& counted = counts_[names];
-          counted.messages += static_cast<std::uint64_t>(rows.integer(1));
-          counted.first_ns = std::min(counted.first_ns, rows.integer(2));
-          counted.last_ns = std::max(counted.last_ns, rows.integer(3));
-        }
+  void list_topics() {
+    std::map<std::pair<std::string, std::string>, Ros2FileTopic> counts;
+    for (const Part& part : parts_)
+      for (const Ros2FileTopic& topic : part.file->topics()) {
+        Ros2FileTopic& counted = counts[{topic.name, type_as_in_ros1(topic.type)}];
+        counted.messages += topic.messages;
+        counted.first_ns = std::min(counted.first_ns, topic.first_ns);
+        counted.last_ns = std::max(counted.last_ns, topic.last_ns);
+      }
+    for (const auto& [names, counted] : counts)
+      topics_.push_back({names.first, names.second, counted.messages,
+                         counted.messages > 0
+                             ? 1e-9 * (static_cast<double>(counted.last_ns) - static_cast<double>(counted.first_ns))
+                             : 0});
   }
 
   std::string path_, remark_;
+  bool by_time_ = false;
   std::vector<Part> parts_;
-  std::map<std::pair<std::string, std::string>, Counted> counts_;
   std::vector<BagTopic> topics_;
 };
 

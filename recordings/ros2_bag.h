@@ -7,8 +7,8 @@
 
 namespace lapservo::internal {
 
-/// A ROS 2 bag: a folder with metadata.yaml, whose files are read in its order, or one .db3 of it. Nothing is written
-/// there. Throws InputError for what is no such bag, compressed ones and those of another storage than sqlite3.
+/// A ROS 2 bag: a folder, whose files are read in the order of its metadata.yaml or else of their times, or one .db3 or
+/// .mcap of it. Nothing is written there. Throws InputError for what is no such bag, and compressed files.
 std::unique_ptr<Bag> open_ros2_bag(const std::string& path);
 
 }  // namespace lapservo::internal

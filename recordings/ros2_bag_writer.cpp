@@ -1,13 +1,17 @@
 #include "recordings/ros2_bag_writer.h"
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
+#include <fstream>
 #include <limits>
 #include <map>
 #include <span>
-#include <sqlite3.h>
 #include <system_error>
+#include <utility>
+#include <zlib.h>
 
 #include <yaml-cpp/yaml.h>
 
@@ -15,13 +19,47 @@
 #include "lapservo/core/error.h"
 #include "lapservo/core/new_folder.h"
 #include "recordings/bag.h"
+#include "recordings/file_bytes.h"
+#include "recordings/mcap_format.h"
 #include "transports/ros2/cdr_encoder.h"
 
 namespace lapservo::internal {
 namespace {
 namespace fs = std::filesystem;
 
-constexpr double commit_every_s = 0.5;
+// The content of a record, field after field.
+class McapRecord {
+ public:
+  explicit McapRecord(mcap::Op op) : op_(op) {}
+
+  template <typename T>
+  McapRecord& add(T value) {
+    return append(&value, sizeof value);
+  }
+  McapRecord& block(const Bytes& bytes) {
+    add(static_cast<std::uint32_t>(bytes.size()));
+    return append(bytes.data(), bytes.size());
+  }
+  McapRecord& text(const std::string& text) { return block({text.begin(), text.end()}); }
+  const Bytes& content() const { return content_; }
+  /// Its opcode, length and content, of which so many bytes more follow.
+  Bytes head(std::size_t follow) const {
+    McapRecord record(op_);
+    record.add(op_).add(std::uint64_t{content_.size() + follow}).append(content_.data(), content_.size());
+    return std::move(record.content_);
+  }
+
+ private:
+  McapRecord& append(const void* bytes, std::size_t count) {
+    const std::size_t at = content_.size();
+    content_.resize(at + count);
+    if (count > 0) std::memcpy(&content_[at], bytes, count);
+    return *this;
+  }
+
+  mcap::Op op_;
+  Bytes content_;
+};
 
 fs::path expect_empty(const fs::path& folder) {
   std::error_code error;
@@ -39,86 +77,92 @@ std::string type_in_ros2(std::string type) {
 
 struct Ros2BagWriter::File {
   struct Topic {
-    int number = 0;
+    std::uint16_t number = 0;  // of its channel and schema
     std::string type;
-    std::int64_t messages = 0;
+    std::uint64_t messages = 0;
   };
 
   explicit File(const fs::path& path)
-      : folder(expect_empty(path)), name(fs::absolute(path).lexically_normal().filename().string() + "_0.db3") {
-    sqlite3* opened = nullptr;
-    const int result = sqlite3_open((folder.path() / name).c_str(), &opened);
-    database.reset(opened, sqlite3_close_v2);
-    if (result != SQLITE_OK) fail();
-    run("PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL;"
-        "CREATE TABLE schema(schema_version INTEGER PRIMARY KEY, ros_distro TEXT NOT NULL);"
-        "CREATE TABLE metadata(id INTEGER PRIMARY KEY, metadata_version INTEGER NOT NULL, metadata TEXT NOT NULL);"
-        "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL, serialization_format TEXT "
-        "NOT NULL, offered_qos_profiles TEXT NOT NULL);"
-        "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, timestamp INTEGER NOT NULL, "
-        "data BLOB NOT NULL);"
-        "CREATE INDEX timestamp_idx ON messages (timestamp ASC);"
-        "INSERT INTO schema VALUES (3, 'humble');");
-    add_topic = prepared("INSERT INTO topics VALUES (?, ?, ?, 'cdr', '')");
-    add_message = prepared("INSERT INTO messages(topic_id, timestamp, data) VALUES (?, ?, ?)");
-    run("BEGIN");
+      : folder(expect_empty(path)),
+        name(fs::absolute(path).lexically_normal().filename().string() + "_0.mcap"),
+        file(folder.path() / name, std::ios::binary) {
+    file.write(reinterpret_cast<const char*>(mcap::magic.data()), mcap::magic.size());
+    write(McapRecord(mcap::Op::header).text("ros2").text("lapservo"));
+    flush();
   }
 
   // A bag in which nothing came to stand is none.
   ~File() {
-    add_topic.reset(), add_message.reset(), database.reset();
+    file.close();
     std::error_code error;
-    if (topics.empty())
-      for (const char* end : {"", "-wal", "-shm"}) fs::remove(folder.path() / (name + end), error);
+    if (topics.empty()) fs::remove(folder.path() / name, error);
   }
   File(const File&) = delete;
   File& operator=(const File&) = delete;
 
-  [[noreturn]] void fail() const {
-    throw InputError((folder.path() / name).string(),
-                     std::string("can't be written (") + sqlite3_errmsg(database.get()) + ")");
+  void write(const McapRecord& record, std::span<const std::uint8_t> rest = {}) {
+    const Bytes head = record.head(rest.size());
+    for (const std::span<const std::uint8_t> bytes : {std::span<const std::uint8_t>(head), rest})
+      file.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
   }
-  void run(const char* command) {
-    if (sqlite3_exec(database.get(), command, nullptr, nullptr, nullptr) != SQLITE_OK) fail();
-  }
-  std::shared_ptr<sqlite3_stmt> prepared(const char* command) {
-    sqlite3_stmt* statement = nullptr;
-    if (sqlite3_prepare_v2(database.get(), command, -1, &statement, nullptr) != SQLITE_OK) fail();
-    return {statement, sqlite3_finalize};
-  }
-  void step(sqlite3_stmt* statement) {
-    if (sqlite3_step(statement) != SQLITE_DONE) fail();
-    sqlite3_reset(statement);
+  void flush() {
+    if (!file.flush())
+      throw InputError((folder.path() / name).string(), std::string("can't be written (") + std::strerror(errno) + ")");
   }
 
+  static McapRecord schema_of(const Topic& topic) {
+    return McapRecord(mcap::Op::schema).add(topic.number).text(topic.type).text("").text("");
+  }
+  static McapRecord channel_of(const std::string& topic_name, const Topic& topic) {
+    return McapRecord(mcap::Op::channel).add(topic.number).add(topic.number).text(topic_name).text("cdr").text("");
+  }
   Topic& topic(const std::string& topic_name, const char* type) {
     const auto [found, is_new] = topics.try_emplace(topic_name);
     if (!is_new) return found->second;
-    found->second = {static_cast<int>(topics.size()), type_in_ros2(type), 0};
-    sqlite3_bind_int(add_topic.get(), 1, found->second.number);
-    sqlite3_bind_text(add_topic.get(), 2, topic_name.c_str(), -1, SQLITE_TRANSIENT);
-    sqlite3_bind_text(add_topic.get(), 3, found->second.type.c_str(), -1, SQLITE_TRANSIENT);
-    step(add_topic.get());
+    found->second = {static_cast<std::uint16_t>(topics.size()), type_in_ros2(type), 0};
+    write(schema_of(found->second));
+    write(channel_of(topic_name, found->second));
     return found->second;
   }
 
   void add(const std::string& topic_name, const char* type, double time_s, std::span<const std::uint8_t> bytes) {
     Topic& to = topic(topic_name, type);
-    const auto time_ns = static_cast<std::int64_t>(std::llround(1e9 * time_s));
-    sqlite3_bind_int(add_message.get(), 1, to.number);
-    sqlite3_bind_int64(add_message.get(), 2, time_ns);
-    sqlite3_bind_blob64(add_message.get(), 3, bytes.data(), bytes.size(), SQLITE_STATIC);
-    step(add_message.get());
-    ++to.messages, first_ns = std::min(first_ns, time_ns), last_ns = std::max(last_ns, time_ns);
-    if (time_s < committed_s + commit_every_s && time_s >= committed_s) return;
-    committed_s = time_s;
-    run("COMMIT; BEGIN");
+    const auto time_ns = static_cast<std::uint64_t>(std::llround(1e9 * time_s));
+    const auto sequence = static_cast<std::uint32_t>(++to.messages);
+    write(McapRecord(mcap::Op::message).add(to.number).add(sequence).add(time_ns).add(time_ns), bytes);
+    flush();
+    first_ns = std::min(first_ns, time_ns), last_ns = std::max(last_ns, time_ns);
+  }
+
+  // In front of the footer: all topics, and how many messages they have.
+  void end() {
+    write(McapRecord(mcap::Op::data_end).add(std::uint32_t{0}));
+    const auto begin = static_cast<std::uint64_t>(file.tellp());
+    Bytes summary, counts;
+    std::uint64_t messages = 0;
+    const auto append = [](Bytes& to, const Bytes& bytes) { to.insert(to.end(), bytes.begin(), bytes.end()); };
+    for (const auto& [topic_name, t] : topics) append(summary, schema_of(t).head(0));
+    for (const auto& [topic_name, t] : topics) append(summary, channel_of(topic_name, t).head(0));
+    McapRecord count(mcap::Op::none);
+    for (const auto& [topic_name, t] : topics) count.add(t.number).add(t.messages), messages += t.messages;
+    const auto number = static_cast<std::uint16_t>(topics.size());
+    McapRecord statistics(mcap::Op::statistics);
+    statistics.add(messages).add(number).add(std::uint32_t{number});
+    for (int i = 0; i < 3; ++i) statistics.add(std::uint32_t{0});  // attachments, metadata, chunks
+    statistics.add(messages > 0 ? first_ns : 0).add(last_ns).block(count.content());
+    append(summary, statistics.head(0));
+    append(summary, McapRecord(mcap::Op::footer).add(begin).add(std::uint64_t{0}).head(sizeof(std::uint32_t)));
+    const auto crc = static_cast<std::uint32_t>(crc32_z(0, summary.data(), summary.size()));
+    file.write(reinterpret_cast<const char*>(summary.data()), static_cast<std::streamsize>(summary.size()));
+    file.write(reinterpret_cast<const char*>(&crc), sizeof crc);
+    file.write(reinterpret_cast<const char*>(mcap::magic.data()), mcap::magic.size());
+    flush();
   }
 
   std::string metadata() const {
-    std::int64_t messages = 0;
+    std::uint64_t messages = 0;
     for (const auto& [topic_name, t] : topics) messages += t.messages;
-    const std::int64_t begin_ns = messages > 0 ? first_ns : 0, duration_ns = messages > 0 ? last_ns - first_ns : 0;
+    const std::uint64_t begin_ns = messages > 0 ? first_ns : 0, duration_ns = messages > 0 ? last_ns - first_ns : 0;
     const auto times = [&](YAML::Emitter& yaml) {
       yaml << YAML::Key << "duration" << YAML::Value << YAML::BeginMap << YAML::Key << "nanoseconds" << YAML::Value
            << duration_ns << YAML::EndMap << YAML::Key << "starting_time" << YAML::Value << YAML::BeginMap << YAML::Key
@@ -127,7 +171,7 @@ struct Ros2BagWriter::File {
     };
     YAML::Emitter yaml;
     yaml << YAML::BeginMap << YAML::Key << "rosbag2_bagfile_information" << YAML::Value << YAML::BeginMap << YAML::Key
-         << "version" << YAML::Value << 5 << YAML::Key << "storage_identifier" << YAML::Value << "sqlite3";
+         << "version" << YAML::Value << 5 << YAML::Key << "storage_identifier" << YAML::Value << "mcap";
     times(yaml);
     yaml << YAML::Key << "topics_with_message_count" << YAML::Value << YAML::BeginSeq;
     for (const auto& [topic_name, t] : topics)
@@ -147,11 +191,9 @@ struct Ros2BagWriter::File {
 
   NewFolder folder;
   std::string name;
-  std::shared_ptr<sqlite3> database;
-  std::shared_ptr<sqlite3_stmt> add_topic, add_message;  // before the database is closed
+  std::ofstream file;
   std::map<std::string, Topic> topics;
-  std::int64_t first_ns = std::numeric_limits<std::int64_t>::max(), last_ns = std::numeric_limits<std::int64_t>::min();
-  double committed_s = 0;
+  std::uint64_t first_ns = std::numeric_limits<std::uint64_t>::max(), last_ns = 0;
 };
 
 Ros2BagWriter::Ros2BagWriter(const fs::path& folder) : file_(std::make_unique<File>(folder)) {}
@@ -171,9 +213,7 @@ void Ros2BagWriter::write(const std::string& topic, double time_s, const Compres
 }
 
 void Ros2BagWriter::finish() {
-  file_->run("COMMIT; PRAGMA wal_checkpoint(TRUNCATE)");
-  file_->add_topic.reset(), file_->add_message.reset();
-  file_->run("PRAGMA journal_mode = DELETE");
+  file_->end();
   if (!file_->topics.empty()) write_file(file_->folder.path() / "metadata.yaml", file_->metadata());
 }
 

@@ -8,8 +8,8 @@
 
 namespace lapservo::internal {
 
-/// Writes a ROS 2 bag as rosbag2 does: a folder of metadata.yaml and a .db3. Written messages survive the program in
-/// the .db3, except for the last half second.
+/// Writes a ROS 2 bag as rosbag2 does: a folder of metadata.yaml and an .mcap, without chunks (rosbag2's preset
+/// `fastwrite`). Written messages survive the program.
 class Ros2BagWriter {
  public:
   /// Throws InputError when `folder` holds something already or can't be written.

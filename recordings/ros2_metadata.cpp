@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <string>
 #include <system_error>
+#include <utility>
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <yaml-cpp/yaml.h>
 
 #include "lapservo/core/error.h"
@@ -20,8 +23,8 @@ std::string text_in(const YAML::Node& node, const char* key) {
 std::vector<fs::path> files_in(const YAML::Node& information, const fs::path& folder, const std::string& source) {
   if (!information || !information.IsMap())
     throw InputError(source, "has no rosbag2_bagfile_information, expected a ROS 2 bag's: `ros2 bag reindex` makes it");
-  if (const std::string storage = text_in(information, "storage_identifier"); storage != "sqlite3")
-    throw InputError(source, "storage_identifier", storage, "sqlite3: convert it with `ros2 bag convert`");
+  if (const std::string storage = text_in(information, "storage_identifier"); storage != "sqlite3" && storage != "mcap")
+    throw InputError(source, "storage_identifier", storage, "sqlite3 or mcap: convert it with `ros2 bag convert`");
   if (const std::string format = text_in(information, "compression_format"); !format.empty())
     throw InputError(source, "compression_format", format, "none: convert it with `ros2 bag convert`");
   std::vector<fs::path> files;
@@ -48,20 +51,39 @@ std::vector<fs::path> unlisted_in(const fs::path& folder, const std::vector<fs::
   return files;
 }
 
+// A recorder that was killed leaves no metadata.yaml, and an empty file where it had just begun one.
+Ros2BagFiles files_without_metadata(const fs::path& folder) {
+  std::vector<fs::path> files = unlisted_in(folder, {});
+  std::error_code error;
+  std::erase_if(files, [&](const fs::path& file) { return fs::file_size(file, error) == 0; });
+  for (const fs::path& file : files)
+    if (file.extension() != files.front().extension() || file.extension() == ".zstd")
+      throw InputError(folder.string(),
+                       "has no metadata.yaml, and compressed files or files of several kinds, expected .mcap or .db3: "
+                       "name one of its files, or make it with `ros2 bag reindex`");
+  if (files.empty()) throw InputError(folder.string(), "has only empty files, expected a ROS 2 bag's");
+  return {std::move(files), "has no metadata.yaml: the times of its files decide their order", true};
+}
+
+std::string remark_on(const std::vector<fs::path>& unlisted) {
+  if (unlisted.empty()) return {};
+  std::vector<std::string> names;
+  for (const fs::path& file : unlisted) names.push_back(file.filename().string());
+  return fmt::format("metadata.yaml does not list {}: not read; `ros2 bag reindex` lists all files",
+                     fmt::join(names, ", "));
+}
+
 }  // namespace
 
 Ros2BagFiles files_of_ros2_bag(const fs::path& folder) {
   const fs::path metadata = folder / "metadata.yaml";
   std::error_code error;
-  if (!fs::exists(metadata, error))
-    throw InputError(folder.string(),
-                     "has no metadata.yaml, expected a ROS 2 bag's: name one of its .db3, or make it with `ros2 bag "
-                     "reindex`");
+  if (!fs::exists(metadata, error)) return files_without_metadata(folder);
   try {
-    Ros2BagFiles files{
-        files_in(YAML::LoadFile(metadata.string())["rosbag2_bagfile_information"], folder, metadata.string()), {}};
-    files.unlisted = unlisted_in(folder, files.listed);
-    return files;
+    const YAML::Node information = YAML::LoadFile(metadata.string())["rosbag2_bagfile_information"];
+    std::vector<fs::path> files = files_in(information, folder, metadata.string());
+    std::string remark = remark_on(unlisted_in(folder, files));
+    return {std::move(files), std::move(remark), false};
   } catch (const YAML::Exception& problem) {
     throw InputError(metadata.string(),
                      std::string("can't be read (") + problem.msg + "), expected a ROS 2 bag's YAML");

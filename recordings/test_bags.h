@@ -31,6 +31,14 @@ void write_ros1_bag(const std::filesystem::path& path, const std::vector<BagEntr
                     const std::string& compression = "none");
 /// A .db3 with rosbag2's tables.
 void write_ros2_bag(const std::filesystem::path& path, const std::vector<BagEntry>& entries);
+
+struct McapLayout {
+  std::string compression;           ///< "", "lz4" or "zstd"
+  std::size_t messages_a_chunk = 3;  ///< 0: no chunks
+  bool with_summary = true, with_checksums = true;
+};
+/// An MCAP file as its specification has it, by code that shares nothing with the reader.
+void write_mcap(const std::filesystem::path& path, const std::vector<BagEntry>& entries, const McapLayout& layout = {});
 /// The metadata.yaml of a folder with such files.
 void write_ros2_metadata(const std::filesystem::path& folder, const std::vector<std::string>& files,
                          const std::string& storage = "sqlite3", const std::string& compression = "");

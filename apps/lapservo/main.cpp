@@ -5,7 +5,7 @@ int main(int argc, char** argv) {
   using namespace lapservo::app;
   return run_program(argc, argv,
                      {add_track, add_view, add_calibrate, add_check, add_experiment,
-#ifdef LAPSERVO_ROS2_BAGS
+#ifdef LAPSERVO_BAGS
                       add_record,
 #endif
                       add_render, add_sample, add_servo, add_sim_robot, add_marker, add_estimate_rcm});

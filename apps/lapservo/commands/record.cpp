@@ -290,7 +290,8 @@ void add_record(Command app, Run& run_later) {
                   "/dev/videoN; gst:PIPELINE")
       .required();
   command.add_option("--robot", options->robot, "The arm whose measured_js is recorded too: ros2:PSM1 or ros1:PSM1");
-  command.add_option("--out", options->out, "Folder to make: a ROS 2 bag; a second of raw 720p takes 80 MB").required();
+  command.add_option("--out", options->out, "Folder to make: a ROS 2 bag (MCAP); a second of raw 720p takes 80 MB")
+      .required();
   command.add_option("--rig", options->rig,
                      "Its camera's size is that of /dev/videoN, else GStreamer's choice; also for --move");
   command.add_option("--duration", options->duration_s, "Seconds, from the first image on").number_between(1, 3600);

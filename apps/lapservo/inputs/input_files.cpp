@@ -33,7 +33,7 @@ void InputFiles::add_pictures_in(const fs::path& folder) {
   std::error_code error;
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error))
     if (has_image_extension(entry->path()) || entry->path().extension() == ".yaml" ||
-        entry->path().extension() == ".db3")
+        entry->path().extension() == ".db3" || entry->path().extension() == ".mcap")
       add(entry->path());
 }
 

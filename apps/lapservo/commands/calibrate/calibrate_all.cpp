@@ -217,7 +217,7 @@ class Guide {
   CalibrationRecord record_;
 };
 
-#ifdef LAPSERVO_ROS2_BAGS
+#ifdef LAPSERVO_BAGS
 // The recording of this name beside the rig, made now where it isn't there. Empty: it could not be made.
 std::string recorded(const AllOptions& options, const std::string& name, const char* what) {
   const fs::path folder = fs::path(options.rig + ".recordings") / name;
@@ -267,13 +267,13 @@ int run_all(AllOptions options) {
   if (options.camera.empty() && (options.enable_motion || !options.robot.empty()))
     throw InputError(options.robot.empty() ? "--enable-motion" : "--robot", "needs --camera: both are to be recorded");
   if (!options.camera.empty()) {
-#ifdef LAPSERVO_ROS2_BAGS
+#ifdef LAPSERVO_BAGS
     if (options.turn.empty()) options.turn = recorded(options, "turn", to_record_turn);
     if (options.turn.empty()) return 1;
     if (options.swing.empty()) options.swing = recorded(options, "swing", to_record_swing);
     if (options.swing.empty()) return 1;
 #else
-    throw InputError("--camera", "can't be recorded by this build, which lacks libsqlite3-dev");
+    throw InputError("--camera", "can't be recorded by this build, which is without bags");
 #endif
   }
   if (options.motion.empty()) options.motion = options.swing.empty() ? options.turn : options.swing;

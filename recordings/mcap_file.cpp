@@ -1,0 +1,242 @@
+#include <algorithm>
+#include <filesystem>
+#include <iterator>
+#include <map>
+#include <optional>
+#include <set>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "lapservo/core/error.h"
+#include "recordings/mcap_messages.h"
+
+namespace lapservo::internal {
+using namespace mcap;
+namespace {
+
+using ChannelNumbers = std::set<std::uint16_t>;
+
+// A part of a file with messages: all of it, or a chunk.
+struct Part {
+  std::uint64_t begin = 0, end = 0;
+  std::uint64_t first_ns = 0;  // of a chunk
+  ChannelNumbers channels;     // of its messages; empty: not known
+};
+
+struct Contents {
+  Part all;
+  std::vector<Part> chunks;  // by their times; none where they are not known
+  McapChannels channels;
+  std::optional<std::uint64_t> ends_early_at;
+};
+
+FileBytes opened(const std::string& path) {
+  return FileBytes(path, "an MCAP recording");
+}
+
+void count(Ros2FileTopic& topic, std::uint64_t messages, std::uint64_t first_ns, std::uint64_t last_ns) {
+  topic.messages += messages;
+  topic.first_ns = std::min(topic.first_ns, first_ns), topic.last_ns = std::max(topic.last_ns, last_ns);
+}
+
+// The summary of a file that was finished.
+class Summary {
+ public:
+  // nullopt where there is none, or none that counts messages and chunks.
+  static std::optional<Contents> read(FileBytes& file) {
+    constexpr std::uint64_t tail = record_head + footer_size + magic.size(), most = 256 << 20;
+    if (file.size() < magic.size() + tail) return std::nullopt;
+    const std::uint64_t end = file.size() - tail;
+    const auto footer = file.bytes(end, tail);
+    ByteView from = footer ? ByteView(*footer) : ByteView();
+    const auto op = taken<Op>(from);
+    const auto size = taken<std::uint64_t>(from), begin = taken<std::uint64_t>(from);
+    taken<std::uint64_t>(from);  // of the summary's own index
+    const auto crc = taken<std::uint32_t>(from);
+    if (op != Op::footer || size != footer_size || !std::equal(from.begin(), from.end(), magic.begin(), magic.end()) ||
+        *begin < magic.size() || *begin > end || end - *begin > most)
+      return std::nullopt;
+    const auto bytes = file.bytes(*begin, end + record_head + footer_size - sizeof *crc - *begin);
+    if (!bytes || !has_mcap_crc(*bytes, *crc)) return std::nullopt;
+    Summary summary(*begin);
+    return summary.add_all(ByteView(*bytes).first(end - *begin)) ? std::optional(summary.contents_) : std::nullopt;
+  }
+
+ private:
+  explicit Summary(std::uint64_t end) : end_(end) { contents_.all = {magic.size(), end, 0, {}}; }
+
+  bool add_all(ByteView from) {
+    ByteView statistics;
+    while (!from.empty()) {
+      const auto op = taken<Op>(from);
+      const auto content = block_taken<std::uint64_t>(from);
+      if (!content || !contents_.channels.add(*op, *content)) return false;
+      if (op == Op::chunk_index && !add_chunk(*content)) return false;
+      if (op == Op::statistics) statistics = *content;
+    }
+    std::sort(contents_.chunks.begin(), contents_.chunks.end(), [](const Part& a, const Part& b) {
+      return std::pair(a.first_ns, a.begin) < std::pair(b.first_ns, b.begin);
+    });
+    return add_counts(statistics);
+  }
+  bool add_chunk(ByteView from) {
+    const auto first_ns = taken<std::uint64_t>(from), last_ns = taken<std::uint64_t>(from);
+    const auto begin = taken<std::uint64_t>(from), size = taken<std::uint64_t>(from);
+    auto indexes = block_taken(from);
+    if (!indexes || *begin < magic.size() || *begin > end_ || *size > end_ - *begin) return false;
+    Part part{*begin, *begin + *size, *first_ns, {}};
+    while (const auto channel = taken<std::uint16_t>(*indexes)) {
+      taken<std::uint64_t>(*indexes);  // where in the chunk
+      part.channels.insert(*channel);
+      const auto [times, is_new] = times_.try_emplace(*channel, *first_ns, *last_ns);
+      times->second = {std::min(times->second.first, *first_ns), std::max(times->second.second, *last_ns)};
+    }
+    contents_.chunks.push_back(std::move(part));
+    return true;
+  }
+  bool add_counts(ByteView from) {
+    const auto messages = taken<std::uint64_t>(from);
+    taken<std::uint16_t>(from);                 // schemas
+    taken<std::array<std::uint32_t, 3>>(from);  // channels, attachments, metadata
+    const auto chunks = taken<std::uint32_t>(from);
+    const auto first_ns = taken<std::uint64_t>(from), last_ns = taken<std::uint64_t>(from);
+    auto counts = block_taken(from);
+    if (!counts || *chunks != contents_.chunks.size() || (counts->empty() && *messages > 0)) return false;
+    while (const auto channel = taken<std::uint16_t>(*counts)) {
+      const auto counted = taken<std::uint64_t>(*counts);
+      const auto topic = contents_.channels.topics.find(*channel);
+      if (!counted || topic == contents_.channels.topics.end()) return false;
+      const auto times = times_.try_emplace(*channel, *first_ns, *last_ns).first->second;
+      if (*counted > 0) count(topic->second, *counted, times.first, times.second);
+    }
+    return true;
+  }
+
+  std::uint64_t end_;  // of the messages
+  Contents contents_;
+  std::map<std::uint16_t, std::pair<std::uint64_t, std::uint64_t>> times_;
+};
+
+// All messages are read to count them.
+Contents found_by_reading(FileBytes& file) {
+  Contents contents;
+  contents.all = {magic.size(), file.size(), 0, {}};
+  McapMessages messages(file, magic.size(), file.size(), true);
+  std::map<std::uint16_t, Ros2FileTopic> counted;
+  while (const auto message = messages.next()) count(counted[message->channel], 1, message->time_ns, message->time_ns);
+  contents.channels = messages.channels();
+  for (auto& [number, topic] : contents.channels.topics)
+    count(topic, counted[number].messages, counted[number].first_ns, counted[number].last_ns);
+  if (!messages.is_finished()) contents.ends_early_at = messages.ends_early_at().value_or(file.size());
+  return contents;
+}
+
+// The messages of chunks in the order of their times. Chunks may overlap in time, so each is read when a message of it
+// may be the next.
+class IndexedMessages : public Ros2FileMessages {
+ public:
+  IndexedMessages(const std::string& path, std::vector<Part> chunks, ChannelNumbers channels)
+      : file_(opened(path)), chunks_(std::move(chunks)), channels_(std::move(channels)) {}
+
+  bool next() override {
+    constexpr std::size_t most = std::size_t{128} << 20;  // of bytes that wait, whatever their order is
+    while (next_ < chunks_.size() &&
+           (ahead_.empty() || (bytes_ahead_ < most && ahead_.begin()->first >= chunks_[next_].first_ns)))
+      read(chunks_[next_++]);
+    if (ahead_.empty()) return false;
+    auto first = ahead_.extract(ahead_.begin());
+    recorded_ns_ = first.key(), content_ = std::move(first.mapped());
+    bytes_ahead_ -= content_.size();
+    return true;
+  }
+  std::span<const std::uint8_t> bytes() override { return content_; }
+  std::uint64_t recorded_ns() const override { return recorded_ns_; }
+
+ private:
+  void read(const Part& chunk) {
+    McapMessages messages(file_, chunk.begin, chunk.end, false);
+    while (const auto message = messages.next())
+      if (channels_.contains(message->channel)) {
+        const ByteView data = messages.data();
+        ahead_.emplace(message->time_ns, Bytes(data.begin(), data.end()));
+        bytes_ahead_ += data.size();
+      }
+  }
+
+  FileBytes file_;
+  std::vector<Part> chunks_;
+  ChannelNumbers channels_;
+  std::size_t next_ = 0, bytes_ahead_ = 0;
+  std::multimap<std::uint64_t, Bytes> ahead_;  // by their times
+  std::uint64_t recorded_ns_ = 0;
+  Bytes content_;
+};
+
+// In the order in which they stand in the file.
+class MessagesInPlace : public Ros2FileMessages {
+ public:
+  MessagesInPlace(const std::string& path, const Part& part, ChannelNumbers channels, bool may_end_early)
+      : file_(opened(path)), messages_(file_, part.begin, part.end, may_end_early), channels_(std::move(channels)) {}
+
+  bool next() override {
+    while (const auto message = messages_.next())
+      if (channels_.contains(message->channel)) return recorded_ns_ = message->time_ns, true;
+    return false;
+  }
+  std::span<const std::uint8_t> bytes() override { return messages_.data(); }
+  std::uint64_t recorded_ns() const override { return recorded_ns_; }
+
+ private:
+  FileBytes file_;
+  McapMessages messages_;
+  ChannelNumbers channels_;
+  std::uint64_t recorded_ns_ = 0;
+};
+
+class McapFile : public Ros2File {
+ public:
+  explicit McapFile(const std::string& path) : path_(path) {
+    FileBytes file = opened(path);
+    const auto begin = file.bytes(0, std::min<std::uint64_t>(file.size(), magic.size()));
+    if (!begin || !std::equal(begin->begin(), begin->end(), magic.begin(), magic.end()))
+      throw InputError(path, "is no MCAP recording of version 0, expected one");
+    auto summary = Summary::read(file);
+    contents_ = summary ? std::move(*summary) : found_by_reading(file);
+    if (contents_.ends_early_at)
+      remark_ = fmt::format("{} was not finished by its recorder: of {} bytes the first {} are read",
+                            std::filesystem::path(path).filename().string(), file.size(), *contents_.ends_early_at);
+    for (const auto& [number, topic] : contents_.channels.topics) topics_.push_back(topic);
+  }
+
+  const std::vector<Ros2FileTopic>& topics() const override { return topics_; }
+  std::string remark() const override { return remark_; }
+  std::unique_ptr<Ros2FileMessages> messages(const std::string& name, const std::string& type) const override {
+    ChannelNumbers wanted;
+    for (const auto& [number, topic] : contents_.channels.topics)
+      if (topic.name == name && topic.type == type) wanted.insert(number);
+    if (contents_.chunks.empty())
+      return std::make_unique<MessagesInPlace>(path_, contents_.all, std::move(wanted),
+                                               contents_.ends_early_at.has_value());
+    std::vector<Part> chunks;
+    std::copy_if(contents_.chunks.begin(), contents_.chunks.end(), std::back_inserter(chunks), [&](const Part& chunk) {
+      return chunk.channels.empty() || std::any_of(wanted.begin(), wanted.end(), [&](std::uint16_t number) {
+               return chunk.channels.contains(number);
+             });
+    });
+    return std::make_unique<IndexedMessages>(path_, std::move(chunks), std::move(wanted));
+  }
+
+ private:
+  std::string path_, remark_;
+  Contents contents_;
+  std::vector<Ros2FileTopic> topics_;
+};
+
+}  // namespace
+
+std::unique_ptr<Ros2File> open_mcap_file(const std::string& path) {
+  return std::make_unique<McapFile>(path);
+}
+
+}  // namespace lapservo::internal

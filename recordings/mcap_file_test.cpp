@@ -1,0 +1,249 @@
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <random>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/testing/input_error.h"
+#include "lapservo/testing/temporary_folder.h"
+#include "recordings/open_bag.h"
+#include "recordings/ros2_file.h"
+#include "recordings/test_bags.h"
+
+namespace lapservo::internal {
+namespace mcap_file_test {
+using testing::BagEntry;
+using testing::input_error;
+using testing::McapLayout;
+
+constexpr double begin_s = 1700000000;
+
+// Messages of two topics in turn, all different; every fifth so long.
+std::vector<BagEntry> entries(int count, std::size_t longest = 40) {
+  std::vector<BagEntry> all;
+  for (int i = 0; i < count; ++i) {
+    const std::string text = "message " + std::to_string(i) + " of " + std::to_string(count) + ".";
+    std::vector<std::uint8_t> bytes(text.begin(), text.end());
+    if (i % 5 == 3) bytes.resize(longest, static_cast<std::uint8_t>(i));
+    all.push_back({i % 2 == 0 ? "/even" : "/odd", "std_msgs/String", begin_s + 0.125 * i, std::move(bytes)});
+  }
+  return all;
+}
+
+struct Raw {
+  std::uint64_t time_ns = 0;
+  std::vector<std::uint8_t> bytes;
+  bool operator==(const Raw&) const = default;
+};
+
+std::vector<Raw> read_all(const Ros2File& file, const std::string& topic) {
+  std::vector<Raw> all;
+  const auto from = file.messages(topic, "std_msgs/msg/String");
+  while (from->next()) all.push_back({from->recorded_ns(), {from->bytes().begin(), from->bytes().end()}});
+  EXPECT_FALSE(from->next());
+  return all;
+}
+
+std::vector<Raw> expected(const std::vector<BagEntry>& entries, const std::string& topic) {
+  std::vector<Raw> all;
+  for (const BagEntry& entry : entries)
+    if (entry.topic == topic)
+      all.push_back({static_cast<std::uint64_t>(std::llround(1e9 * entry.time_s)), entry.bytes});
+  return all;
+}
+
+void expect_entries(const Ros2File& file, const std::vector<BagEntry>& entries) {
+  std::size_t counted = 0;
+  for (const Ros2FileTopic& topic : file.topics()) {
+    const auto messages = expected(entries, topic.name);
+    EXPECT_EQ(topic.type, "std_msgs/msg/String");
+    EXPECT_EQ(topic.format, "cdr");
+    EXPECT_EQ(topic.messages, messages.size());
+    EXPECT_LE(topic.first_ns, messages.front().time_ns);
+    EXPECT_GE(topic.last_ns, messages.back().time_ns);
+    EXPECT_TRUE(read_all(file, topic.name) == messages);
+    counted += messages.size();
+  }
+  EXPECT_EQ(counted, entries.size());
+}
+
+std::vector<McapLayout> layouts() {
+  std::vector<McapLayout> all;
+  for (const char* compression : {"", "lz4", "zstd"})
+    for (const std::size_t messages : {0u, 2u, 100u})
+      for (const bool with_summary : {false, true})
+        if (messages > 0 || *compression == '\0')
+          all.push_back({compression, messages, with_summary, (messages + with_summary) % 2 == 0});
+  return all;
+}
+std::string name_of(const McapLayout& layout) {
+  return layout.compression + " " + std::to_string(layout.messages_a_chunk) + (layout.with_summary ? " summary" : "");
+}
+
+TEST(McapFile, IsReadInEveryLayout) {
+  const testing::TemporaryFolder folder;
+  for (const McapLayout& layout : layouts()) {
+    SCOPED_TRACE(name_of(layout));
+    testing::write_mcap(folder / "a.mcap", entries(11, 40000), layout);
+    const auto file = open_mcap_file(folder / "a.mcap");
+    expect_entries(*file, entries(11, 40000));
+    EXPECT_EQ(file->remark(), "");
+  }
+}
+
+TEST(McapFile, ThatWasCutGivesItsWholeMessages) {
+  const testing::TemporaryFolder folder;
+  const auto messages = entries(3);
+  const std::string path = folder / "a.mcap";
+  for (const McapLayout& layout : layouts()) {
+    SCOPED_TRACE(name_of(layout));
+    testing::write_mcap(path, messages, layout);
+    const std::string whole = testing::read_file(path);
+    std::vector<std::size_t> ends;  // of the messages, where they stand in the file as they are
+    for (const BagEntry& entry : messages)
+      ends.push_back(whole.find(std::string(entry.bytes.begin(), entry.bytes.end())) + entry.bytes.size());
+    std::size_t last = messages.size();
+    for (std::size_t size = whole.size() - 8; size >= 8; --size) {
+      std::filesystem::resize_file(path, size);
+      const auto file = open_mcap_file(path);
+      std::size_t count = 0;
+      for (const Ros2FileTopic& topic : file->topics()) {
+        const auto found = read_all(*file, topic.name), all = expected(messages, topic.name);
+        ASSERT_LE(found.size(), all.size());
+        EXPECT_TRUE(std::equal(found.begin(), found.end(), all.begin()));
+        EXPECT_EQ(topic.messages, found.size());
+        count += found.size();
+      }
+      if (layout.compression.empty()) {
+        ASSERT_EQ(count, static_cast<std::size_t>(
+                             std::count_if(ends.begin(), ends.end(), [size](std::size_t end) { return end <= size; })))
+            << size;
+      }
+      ASSERT_LE(count, last);
+      ASSERT_TRUE(size + 8 < whole.size() || count == messages.size());
+      last = count;
+      EXPECT_EQ(file->remark().empty(),
+                whole.substr(0, size).find(std::string("\x0f\4\0\0\0\0\0\0\0\0\0\0\0", 13)) != std::string::npos);
+    }
+    EXPECT_EQ(last, 0u);
+  }
+}
+
+TEST(McapFile, SaysWhereItWasCut) {
+  const testing::TemporaryFolder folder;
+  testing::write_mcap(folder / "a.mcap", entries(6), {"", 3, false, true});
+  const std::string whole = testing::read_file(folder / "a.mcap");
+  testing::write_file(folder / "a.mcap", whole.substr(0, whole.size() - 60));
+  const std::string remark = open_bag(folder / "a.mcap")->remark();
+  EXPECT_EQ(
+      remark.rfind(
+          "a.mcap was not finished by its recorder: of " + std::to_string(whole.size() - 60) + " bytes the first ", 0),
+      0u)
+      << remark;
+}
+
+TEST(McapFile, WithAnIndexIsReadByTheTimesOfItsMessages) {
+  const testing::TemporaryFolder folder;
+  auto messages = entries(24);
+  std::mt19937 random(59);
+  for (int i = 0; i < 20; ++i) {
+    std::shuffle(messages.begin(), messages.end(), random);
+    testing::write_mcap(folder / "a.mcap", messages, {"", 1 + static_cast<std::size_t>(i) % 7, true, true});
+    expect_entries(*open_mcap_file(folder / "a.mcap"), entries(24));
+  }
+}
+
+TEST(McapFile, ChecksTheSumsThatItHas) {
+  const testing::TemporaryFolder folder;
+  const std::string path = folder / "a.mcap";
+  for (const bool with_checksums : {true, false}) {
+    testing::write_mcap(path, entries(6), {"", 3, true, with_checksums});
+    const std::string whole = testing::read_file(path);
+    std::string damaged = whole;
+    damaged[whole.find("message 1 of")] ^= 1;
+    testing::write_file(path, damaged);
+    const std::string error = input_error([&] { read_all(*open_mcap_file(path), "/odd"); });
+    EXPECT_EQ(error.find("is damaged at byte") != std::string::npos, with_checksums) << error;
+
+    // A summary that is damaged is not used: the messages are all there.
+    damaged = whole;
+    damaged[whole.rfind("/even")] ^= 1;
+    testing::write_file(path, damaged);
+    EXPECT_EQ(open_mcap_file(path)->topics().front().name == "/even", with_checksums);
+  }
+}
+
+TEST(McapFile, ThatIsDamagedIsReadOrRefused) {
+  const testing::TemporaryFolder folder;
+  const std::string path = folder / "a.mcap";
+  std::vector<std::string> files;
+  for (const McapLayout& layout : layouts()) {
+    testing::write_mcap(path, entries(3), layout);
+    files.push_back(testing::read_file(path));
+  }
+  std::mt19937 random(59);
+  const auto below = [&random](std::size_t count) {
+    return std::uniform_int_distribution<std::size_t>(0, count - 1)(random);
+  };
+  int refused = 0;
+  for (int i = 0; i < 4001; ++i) {
+    std::string bytes = files[below(files.size())];
+    for (std::size_t changes = 1 + below(3); changes > 0; --changes) {
+      const std::size_t at = below(2) == 0 ? below(bytes.size()) : below(std::min<std::size_t>(bytes.size(), 300));
+      const std::size_t kind = below(4);
+      if (kind == 0) bytes[at] = static_cast<char>(below(256));
+      if (kind == 1) bytes[at] ^= static_cast<char>(1 << below(8));
+      if (kind == 2) bytes.erase(at, 1 + below(20));
+      if (kind == 3) bytes.insert(at, 1 + below(12), static_cast<char>(below(2) * 255));
+    }
+    testing::write_file(path, bytes);
+    const std::string error = input_error([&] {
+      const auto bag = open_bag(path);
+      for (const BagTopic& topic : bag->topics()) {
+        EXPECT_TRUE(std::isfinite(topic.duration_s));
+        for (const auto from = bag->messages(topic); from->next();) EXPECT_TRUE(std::isfinite(from->recorded_s()));
+      }
+    });
+    EXPECT_EQ(error.find('\n'), std::string::npos) << error;
+    refused += !error.empty();
+  }
+  EXPECT_GT(refused, 400);
+  EXPECT_LT(refused, 3600);
+}
+
+TEST(McapFile, SeveralOfAFolderAreOneBag) {
+  const testing::TemporaryFolder folder;
+  const auto messages = entries(9);
+  const auto count = [](const Bag& bag) {
+    std::size_t all = 0;
+    for (const BagTopic& topic : bag.topics()) all += topic.messages;
+    return all;
+  };
+  testing::write_mcap(folder / "bag_9.mcap", {messages.begin(), messages.begin() + 4});
+  testing::write_mcap(folder / "bag_10.mcap", {messages.begin() + 4, messages.end()}, {"zstd", 3, true, true});
+  testing::write_file(folder / "bag_11.mcap", "");
+  ASSERT_TRUE(is_bag(folder.path()));
+  EXPECT_EQ(count(*open_bag(folder.path())), 9u);
+  EXPECT_EQ(open_bag(folder.path())->remark(), "has no metadata.yaml: the times of its files decide their order");
+  const auto bag = open_bag(folder.path());
+  for (const BagTopic& topic : bag->topics()) {
+    double last_s = 0;
+    for (const auto from = bag->messages(topic); from->next(); last_s = from->recorded_s())
+      EXPECT_GT(from->recorded_s(), last_s);
+  }
+  testing::write_ros2_metadata(folder.path(), {"bag_9.mcap", "bag_10.mcap"}, "mcap");
+  EXPECT_EQ(count(*open_bag(folder.path())), 9u);
+  EXPECT_NE(open_bag(folder.path())->remark().find("does not list bag_11.mcap"), std::string::npos);
+
+  std::filesystem::remove(folder / "metadata.yaml");
+  testing::write_ros2_bag(folder / "bag_12.db3", messages);
+  EXPECT_NE(input_error([&] { open_bag(folder.path()); }).find("files of several kinds"), std::string::npos);
+}
+
+}  // namespace mcap_file_test
+}  // namespace lapservo::internal
