@@ -111,6 +111,32 @@ class CommandLine : public acceptance::ToolTest {
     for (const char* file : {"in/unfinished.mcap", "in/split/run_10.mcap"})
       fs::resize_file(file, fs::file_size(file) - 60);  // what is behind the last chunk
   }
+  // in/session of dvrk_data: a folder's images as the right eye, on the left of a video, and the joints of
+  // write_bags_of().
+  static void write_session_of(const std::string& pictures, double fps) {
+    fs::create_directories("in/pairs");
+    fs::create_directories("in/session/rosbag2");
+    std::string frames;
+    for (int i = 0; fs::exists(fmt::format("in/{}/{:04}.png", pictures, i)); ++i) {
+      const cv::Mat eye = cv::imread(fmt::format("in/{}/{:04}.png", pictures, i));
+      cv::Mat pair;
+      cv::hconcat(eye, cv::Mat(eye.size(), eye.type(), cv::Scalar(90, 90, 90)), pair);
+      cv::imwrite(fmt::format("in/pairs/{:04}.png", i), pair);
+      const auto time_ns = 1700000000000000000 + std::llround(1e9 * i / fps);
+      frames += fmt::format(R"({}{{"frame_index": {}, "gst": {{}}, "cpu": {{"realtime": {{"left_source_ns": {},)"
+                            R"( "right_source_ns": {}, "recorder_reception_ns": {}}}}}}})",
+                            i > 0 ? "," : "", i, time_ns - 1000000, time_ns + 1000000, time_ns + 70000000);
+    }
+    ASSERT_EQ(std::system("ffmpeg -v error -framerate 30 -i in/pairs/%04d.png -c:v libx264 -preset veryfast -qp 0 "
+                          "-pix_fmt yuv444p in/session/stereo.mp4"),
+              0);
+    in("session/stereo.json", R"({"type": "dvrk_data:video_sidecar@1.0.0", "video_file": "stereo.mp4",)"
+                              R"( "side_by_side": "RL", "frames": [)" +
+                                  frames + "]}");
+    in("session/index.json", R"({"type": "dvrk_data:index@1.0.0", "rosbags": "rosbag2", "streams": [)"
+                             R"({"name": "stereo", "videos": [{"file": "stereo.mp4"}]}]})");
+    fs::copy_file("in/zstd.mcap", "in/session/rosbag2/rosbag2_0.mcap");
+  }
   static std::string results_of(const std::string& bag, const std::string& unregistered) {
     expect_done("track " + bag + " --rig out/rig.yaml --out out/bag.csv");
     expect_done("calibrate registration " + bag + " --rig " + unregistered + " --out out/bag.yaml");
@@ -175,6 +201,33 @@ TEST_F(CommandLine, AVideoThatItRenderedIsMeasuredWell) {
   EXPECT_LE(std::sqrt(squares / found), 5e-3);
   EXPECT_GE(std::sqrt(normed / found), 0.7);
   EXPECT_LE(std::sqrt(normed / found), 1.4);
+}
+
+TEST_F(CommandLine, OneOfTwoEyesSideBySideIsMeasuredAsByItself) {
+  for (const char* seed : {"5", "6"})
+    expect_done(std::string("render --rig configs/example.yaml --count 2 --out out/") + seed + " --seed " + seed);
+  fs::create_directories("in/pairs");
+  for (const std::string name : {"0000.png", "0001.png"}) {
+    cv::Mat pair;
+    cv::hconcat(cv::imread("out/5/" + name), cv::imread("out/6/" + name), pair);
+    cv::imwrite("in/pairs/" + name, pair);
+  }
+  const auto track = [](const std::string& input) {
+    expect_done("track " + input + " --rig configs/example.yaml --out out/eye.csv");
+    return read_file("out/eye.csv");
+  };
+  const std::string first = track("out/5"), second = track("out/6");
+  EXPECT_EQ(track("in/pairs --eye left"), first);
+  EXPECT_EQ(track("in/pairs --eye right --side-by-side LR"), second);
+  EXPECT_EQ(track("in/pairs --eye left --side-by-side RL"), second);
+  const std::string refused = " --rig configs/example.yaml --out out/no.csv";
+  EXPECT_EQ(run("track in/pairs" + refused), 2);
+  expect_in(errors(), "2560x720");
+  EXPECT_EQ(run("track in/pairs --side-by-side RL" + refused), 2);
+  expect_in(errors(), "--eye: is missing");
+  cv::imwrite("in/odd.png", cv::Mat(720, 1281, CV_8UC3, cv::Scalar::all(90)));
+  EXPECT_EQ(run("track in/odd.png --eye left" + refused), 2);
+  expect_in(errors(), "1281 columns");
 }
 
 TEST_F(CommandLine, TrackNamesTheRigThatItFound) {
@@ -690,9 +743,29 @@ TEST_F(CommandLine, CalibrateRegistrationWritesWhereTheArmStands) {
       EXPECT_EQ(log.text(i, "action") + log.text(i, "reason"), decided.text(i, "action") + decided.text(i, "reason"))
           << i;
   }
+  // The same as a session of dvrk_data, through H.264.
+  fs::remove_all("in/run");
+  write_bags_of("swing", fps, CsvTable::read("in/joints.csv"));
+  write_session_of("swing", fps);
+  const std::string session = "in/session --eye right --rig ";
+  EXPECT_EQ(run("track in/session --rig out/rig.yaml --out out/no.csv"), 2);
+  expect_in(errors(), "--eye: is missing, expected left or right: in/session has both eyes side by side (RL)");
+  expect_done("track " + session + "out/rig.yaml --out out/session.csv");
+  const CsvTable seen = CsvTable::read("out/session.csv");
+  ASSERT_EQ(seen.rows(), static_cast<std::size_t>(frames));
+  for (std::size_t i = 0; i < seen.rows(); ++i)
+    EXPECT_NEAR(seen.number(i, "time_s"), static_cast<double>(i) / fps, 1e-6);
+  expect_done("calibrate registration " + session + unregistered + " --out out/session.yaml");
+  const Instrument of_session = load_rig("out/session.yaml").instruments[0];
+  EXPECT_EQ(of_session.joints->sign, found.joints->sign);
+  EXPECT_NEAR(of_session.image_delay_s.value(), clock_s, 5e-3);
+  EXPECT_LE((of_session.camera_from_rcm->translation - found.camera_from_rcm->translation).norm(), 1e-3);
+  expect_done("check " + session + "out/session.yaml");
+  expect_done("servo --replay " + session + "out/session.yaml --out out/of_session");
+  expect_in(output(), "72 images and the joints; nothing was sent");
   // A part of it, in each kind of file.
   fs::remove_all("in/run");
-  write_bags_of("swing", fps, CsvTable::read("in/joints.csv"), 0, 48);
+  write_bags_of("swing", fps, CsvTable::read("in/joints.csv"), 0, 44);
   const std::string of_db3 = results_of("in/run", unregistered);
   for (const std::string bag : {"in/plain.mcap", "in/lz4.mcap", "in/zstd.mcap", "in/unfinished.mcap", "in/split"})
     EXPECT_TRUE(results_of(bag, unregistered) == of_db3) << bag;

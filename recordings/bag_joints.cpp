@@ -60,8 +60,8 @@ double lead_s(const Bag& bag, const BagTopic& topic) {
 
 }  // namespace
 
-double clock_lead_s(const Bag& bag, const BagTopic& joints, const BagTopic& images) {
-  return lead_s(bag, joints) - lead_s(bag, images);
+double clock_lead_s(const Bag& bag, const BagTopic& joints, const BagTopic* images) {
+  return lead_s(bag, joints) - (images ? lead_s(bag, *images) : 0);
 }
 
 std::vector<std::string> joint_names_in_bag(const Bag& bag, const BagTopic& topic) {

@@ -18,7 +18,7 @@ std::vector<std::string> joint_names_in_bag(const Bag& bag, const BagTopic& topi
 JointRecording joints_in_bag(const Bag& bag, const BagTopic& topic, const Joints& joints, double begin_s);
 
 /// By how much the clock that stamps `joints` is ahead of that of `images`, as when they were recorded shows. The
-/// message of each topic that came fastest counts, as in the loop.
-double clock_lead_s(const Bag& bag, const BagTopic& joints, const BagTopic& images);
+/// message of each topic that came fastest counts, as in the loop. Without `images`: ahead of the recorder's clock.
+double clock_lead_s(const Bag& bag, const BagTopic& joints, const BagTopic* images);
 
 }  // namespace lapservo::internal

@@ -199,7 +199,8 @@ TEST(McapFile, ThatIsDamagedIsReadOrRefused) {
       if (kind == 0) bytes[at] = static_cast<char>(below(256));
       if (kind == 1) bytes[at] ^= static_cast<char>(1 << below(8));
       if (kind == 2) bytes.erase(at, 1 + below(20));
-      if (kind == 3) bytes.insert(at, 1 + below(12), static_cast<char>(below(2) * 255));
+      if (kind == 3)
+        bytes = bytes.substr(0, at) + std::string(1 + below(12), static_cast<char>(below(2) * 255)) + bytes.substr(at);
     }
     testing::write_file(path, bytes);
     const std::string error = input_error([&] {

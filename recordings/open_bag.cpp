@@ -8,6 +8,7 @@
 #ifdef LAPSERVO_BAGS
 #include "recordings/ros1_bag.h"
 #include "recordings/ros2_bag.h"
+#include "recordings/session.h"
 #endif
 
 namespace lapservo::internal {
@@ -42,6 +43,13 @@ BagKind kind_of(const std::string& path) {
 
 bool is_bag(const std::string& path) {
   return kind_of(path) != BagKind::none;
+}
+
+std::string bag_of(const std::string& input) {
+#ifdef LAPSERVO_BAGS
+  if (is_session(input)) return bag_of_session(input);
+#endif
+  return is_bag(input) ? input : std::string();
 }
 
 std::shared_ptr<const Bag> open_bag(const std::string& path) {

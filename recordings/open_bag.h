@@ -10,6 +10,9 @@ namespace lapservo::internal {
 /// Whether a file or folder is a bag by what it begins with, or means to be one by its name.
 bool is_bag(const std::string& path);
 
+/// The input itself where it is a bag, else the bag of a session of dvrk_data (session.h); empty for others.
+std::string bag_of(const std::string& input);
+
 /// A ROS 1 bag, a ROS 2 bag's folder, a .db3 or an .mcap. Throws InputError for what is none, and for what this build
 /// lacks the libraries for.
 std::shared_ptr<const Bag> open_bag(const std::string& path);

@@ -40,28 +40,27 @@ std::optional<StampedImage> ReplayedRun::RecordedImages::newest() {
   return newest;
 }
 
-ReplayedRun::ShiftedJoints ReplayedRun::joints_of_bag(const Bag& bag, const BagFrames& frames, const std::string& topic,
-                                                      const std::string& arm, const Joints& joints) {
+ReplayedRun::ShiftedJoints ReplayedRun::joints_of_bag(const Bag& bag, const BagTopic* images, double begin_s,
+                                                      const std::string& topic, const std::string& arm,
+                                                      const Joints& joints) {
   const BagTopic* of_arm = joint_topic_of(bag, topic, arm);
   if (!of_arm)
     throw InputError(bag.path(), std::string("has no messages of ") + joint_type + ", expected the arm's joints");
-  ShiftedJoints shifted{joints_in_bag(bag, *of_arm, joints, *frames.first_stamp_s()),
-                        clock_lead_s(bag, *of_arm, image_topic_of(bag, frames.topic()))};
+  ShiftedJoints shifted{joints_in_bag(bag, *of_arm, joints, begin_s), clock_lead_s(bag, *of_arm, images)};
   for (double& time_s : shifted.recording.time_s) time_s -= shifted.lead_s;
   return shifted;
 }
 
-ReplayedRun::ReplayedRun(std::shared_ptr<const Bag> bag, const std::string& image_topic, const std::string& joint_topic,
-                         const std::string& arm, const Joints& joints)
-    : bag_(std::move(bag)),
-      frames_(bag_, image_topic),
-      joints_(joints_of_bag(*bag_, frames_, joint_topic, arm, joints)),
+ReplayedRun::ReplayedRun(std::unique_ptr<FrameSource> frames, const Bag& bag, const BagTopic* images,
+                         const std::string& joint_topic, const std::string& arm, const Joints& joints)
+    : frames_(std::move(frames)),
+      joints_(joints_of_bag(bag, images, frames_->first_stamp_s().value(), joint_topic, arm, joints)),
       clock_(std::max(0.0, joints_.recording.time_s.front())),
       arm_(joints_.recording, joints, clock_),
-      images_(frames_, clock_) {
+      images_(*frames_, clock_) {
   duration_s_ = joints_.recording.time_s.back() - clock_.now;
   if (!(duration_s_ > 0))
-    throw InputError(bag_->path(),
+    throw InputError(bag.path(),
                      fmt::format("its joints end {:.3f} s before its first image, expected both at one time",
                                  -joints_.recording.time_s.back()));
 }

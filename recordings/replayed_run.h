@@ -8,22 +8,24 @@
 #include <vector>
 
 #include "lapservo/calibration/recording/joint_recording.h"
+#include "lapservo/io/frame_source.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/robot/clock.h"
 #include "lapservo/robot/robot.h"
 #include "lapservo/stream/image_stream.h"
-#include "recordings/bag_frames.h"
+#include "recordings/bag.h"
 
 namespace lapservo::internal {
 
 /// An arm that another program moves and its camera, as a bag has them, for run(). Times: seconds since the stamp of
-/// the bag's first image.
+/// the first image.
 class ReplayedRun {
  public:
-  /// Topics: see bag_topics.h. `arm`: the instrument's name. Throws InputError for bags without joints or images, and
-  /// where the joints end before the first image.
-  ReplayedRun(std::shared_ptr<const Bag> bag, const std::string& image_topic, const std::string& joint_topic,
-              const std::string& arm, const Joints& joints);
+  /// `images`: the topic of the frames; nullptr where they have the times of the recorder's clock. `joint_topic`: see
+  /// bag_topics.h. `arm`: the instrument's name. Throws InputError for bags without joints, and where the joints end
+  /// before the first image.
+  ReplayedRun(std::unique_ptr<FrameSource> frames, const Bag& bag, const BagTopic* images,
+              const std::string& joint_topic, const std::string& arm, const Joints& joints);
 
   /// Begins where joints and images do, and passes while somebody sleeps.
   Clock& clock() { return clock_; }
@@ -33,12 +35,12 @@ class ReplayedRun {
   ImageStream& images() { return images_; }
 
   double duration_s() const { return duration_s_; }
-  std::optional<int> image_count() const { return frames_.frame_count(); }
+  std::optional<int> image_count() const { return frames_->frame_count(); }
   int images_given() const { return images_.count; }
   bool ended() const { return !images_.next; }
   /// By how much the arm's clock is ahead of the camera's; its joints are shifted by that.
   double arm_clock_lead_s() const { return joints_.lead_s; }
-  std::string complaint() const { return frames_.complaint(); }
+  std::string complaint() const { return frames_->complaint(); }
   std::string joint_remark() const { return joints_.recording.remark(); }
 
  private:
@@ -70,11 +72,10 @@ class ReplayedRun {
     JointRecording recording;
     double lead_s = 0;
   };
-  static ShiftedJoints joints_of_bag(const Bag& bag, const BagFrames& frames, const std::string& topic,
+  static ShiftedJoints joints_of_bag(const Bag& bag, const BagTopic* images, double begin_s, const std::string& topic,
                                      const std::string& arm, const Joints& joints);
 
-  std::shared_ptr<const Bag> bag_;
-  BagFrames frames_;
+  std::unique_ptr<FrameSource> frames_;
   ShiftedJoints joints_;
   double duration_s_ = 0;
   RecordedClock clock_;

@@ -6,9 +6,11 @@
 #include "apps/lapservo/cli/interrupt.h"
 #include "cameras/camera.h"
 #include "lapservo/core/error.h"
+#include "lapservo/io/half_frames.h"
 #include "lapservo/io/video/read_ahead.h"
 #include "recordings/bag_frames.h"
 #include "recordings/open_bag.h"
+#include "recordings/session.h"
 
 namespace lapservo::app {
 using namespace internal;
@@ -27,20 +29,48 @@ void expect_srgb(const std::string& input, const Response& response) {
                    "expected srgb, or one that calibrate camera or colour measured");
 }
 
-}  // namespace
+// `layout`: LR or RL where the input says that it has both eyes.
+std::unique_ptr<FrameSource> of_one_eye(std::unique_ptr<FrameSource> frames, const std::string& input,
+                                        const FrameOptions& options, const std::string& layout) {
+  const std::string& order = options.side_by_side.empty() ? layout : options.side_by_side;
+  if (options.eye.empty() && order.empty()) return frames;
+  if (options.eye.empty())
+    throw InputError("--eye",
+                     "is missing, expected left or right: " + input + " has both eyes side by side (" + order + ")");
+  const bool is_first = (options.eye == "left") == (order != "RL");
+  return half_frames(std::move(frames), is_first ? Half::left : Half::right, input);
+}
 
-std::unique_ptr<FrameSource> open_frames(const std::string& input, const FrameOptions& options, const Camera* camera) {
+struct WholeFrames {
+  std::unique_ptr<FrameSource> source;
+  std::string layout;  // of both eyes, where the input says it
+};
+
+WholeFrames open_whole(const std::string& input, const FrameOptions& options, const Camera* camera) {
+  const VideoReading reading{options.deinterlace || (camera && camera->deinterlace), options.colour_matrix,
+                             options.chroma_location};
   if (is_bag(input)) {
     auto frames = std::make_unique<BagFrames>(open_bag(input), options.image_topic);
     say_if_undistorted(frames->topic(), camera);
-    say_remark(input, frames->remark());
-    return read_ahead(std::move(frames));
+    return {std::move(frames), {}};
   }
+#ifdef LAPSERVO_BAGS
+  if (is_session(input)) {
+    Session session(input, options.image_topic, reading);
+    return {session.frames(), session.layout()};
+  }
+#endif
   refuse_topic_outside_bags("--image-topic", options.image_topic, input);
-  const cv::Size size = camera ? cv::Size(camera->width_px, camera->height_px) : cv::Size();
-  const VideoReading reading{options.deinterlace || (camera && camera->deinterlace), options.colour_matrix,
-                             options.chroma_location};
-  auto source = open_camera_or_file(input, options.fps, size, interrupted, reading);
+  const int eyes = options.eye.empty() ? 1 : 2;
+  const cv::Size size = camera ? cv::Size(eyes * camera->width_px, camera->height_px) : cv::Size();
+  return {open_camera_or_file(input, options.fps, size, interrupted, reading), {}};
+}
+
+}  // namespace
+
+std::unique_ptr<FrameSource> open_frames(const std::string& input, const FrameOptions& options, const Camera* camera) {
+  WholeFrames whole = open_whole(input, options, camera);
+  auto source = of_one_eye(std::move(whole.source), input, options, whole.layout);
   if (source->is_srgb() && camera) expect_srgb(input, camera->response);
   say_remark(input, source->remark());
   return source->kind() == FrameSource::Kind::live ? std::move(source) : read_ahead(std::move(source));
@@ -59,10 +89,24 @@ void refuse_topic_outside_bags(const std::string& option, const std::string& top
 }
 
 void add_image_topic_option(Command command, std::string& image_topic) {
-  command.add_option("--image-topic", image_topic, "In a bag with several: the topic of the images");
+  command.add_option("--image-topic", image_topic,
+                     "In a bag with several: the topic of the images; in a session of dvrk_data: the stream");
+}
+
+void add_eye_options(Command command, FrameOptions& options) {
+  command
+      .add_option("--eye", options.eye,
+                  "The eye that is the rig's camera, where frames have both of an endoscope side by side")
+      .one_of({"left", "right"});
+  command
+      .add_option("--side-by-side", options.side_by_side,
+                  "With --eye: which eye is on the left of the frames (LR: the left one); else as a session of "
+                  "dvrk_data says, or LR")
+      .one_of({"LR", "RL"});
 }
 
 void add_video_options(Command command, FrameOptions& options) {
+  add_eye_options(command, options);
   command.add_option("--colour-matrix", options.colour_matrix, "Colour matrix of a video, in the place of its own")
       .one_of({"bt601", "bt709", "bt2020"});
   command

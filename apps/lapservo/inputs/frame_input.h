@@ -11,13 +11,16 @@ namespace lapservo::app {
 
 /// How a command reads its frames.
 struct FrameOptions {
-  std::string image_topic;   ///< of a bag: see internal::image_topic_of()
+  std::string image_topic;   ///< of a bag: see internal::image_topic_of(); of a session: the stream
+  std::string eye;           ///< left or right, where both are side by side in each frame; else empty
+  std::string side_by_side;  ///< LR or RL; empty: as a session says, else LR
   double fps = 30;           ///< of a folder of images
   bool deinterlace = false;  ///< one field of each frame is tracked; also where the rig's camera says so
   std::string colour_matrix, chroma_location;  ///< see VideoReading
 };
 
-/// internal::open_camera_or_file() until Ctrl-C, and the images of bags. Says the source's remark on stderr. `camera`:
+/// internal::open_camera_or_file() until Ctrl-C, and the images of bags and of sessions of dvrk_data, of one eye where
+/// the options name it. Says the source's remark on stderr. `camera`:
 /// the rig's, whose size a camera's images shall have; null where none is known.
 std::unique_ptr<FrameSource> open_frames(const std::string& input, const FrameOptions& options, const Camera* camera);
 
@@ -33,7 +36,10 @@ void refuse_topic_outside_bags(const std::string& option, const std::string& top
 
 void add_image_topic_option(Command command, std::string& image_topic);
 
-/// --colour-matrix and --chroma-location.
+/// --eye and --side-by-side.
+void add_eye_options(Command command, FrameOptions& options);
+
+/// Those, --colour-matrix and --chroma-location.
 void add_video_options(Command command, FrameOptions& options);
 
 }  // namespace lapservo::app

@@ -7,6 +7,7 @@
 
 #include "lapservo/core/error.h"
 #include "lapservo/io/image_file.h"
+#include "recordings/bag_endings.h"
 
 namespace lapservo::app {
 namespace {
@@ -33,7 +34,7 @@ void InputFiles::add_pictures_in(const fs::path& folder) {
   std::error_code error;
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error))
     if (has_image_extension(entry->path()) || entry->path().extension() == ".yaml" ||
-        entry->path().extension() == ".db3" || entry->path().extension() == ".mcap")
+        internal::ends_like(entry->path().string(), {".db3", ".mcap", ".mp4", ".json"}))
       add(entry->path());
 }
 

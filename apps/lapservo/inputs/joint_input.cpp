@@ -60,9 +60,10 @@ void add_joint_topic_option(Command command, std::string& joint_topic) {
 }
 
 JointInput read_joint_input(const CalibrateOptions& options, const Instrument& instrument, const FrameSource* frames) {
-  if (!is_bag(options.joints)) return read_table(options, instrument);
-  const auto bag = open_bag(options.joints);
-  if (options.joints != options.input) say_remark(options.joints, bag->remark());
+  const std::string path = bag_of(options.joints);
+  if (path.empty()) return read_table(options, instrument);
+  const auto bag = open_bag(path);
+  if (path != options.input) say_remark(path, bag->remark());
   const BagTopic* topic = joint_topic_of(*bag, options.joint_topic, instrument.name);
   if (!topic)
     throw InputError(options.joints, std::string("has no messages of ") + joint_type + ", expected the joints'");
@@ -72,11 +73,13 @@ JointInput read_joint_input(const CalibrateOptions& options, const Instrument& i
 std::optional<JointInput> find_joint_input(const CalibrateOptions& options, const Instrument& instrument,
                                            const FrameSource* frames) {
   if (!options.joints.empty()) return read_joint_input(options, instrument, frames);
-  if (!is_bag(options.input)) {
+  const std::string path = bag_of(options.input);
+  if (path.empty()) {
     refuse_topic_outside_bags("--joint-topic", options.joint_topic, options.input);
     return std::nullopt;
   }
-  const auto bag = open_bag(options.input);
+  const auto bag = open_bag(path);
+  if (path != options.input) say_remark(path, bag->remark());
   const BagTopic* topic = joint_topic_of(*bag, options.joint_topic, instrument.name);
   if (!topic) return std::nullopt;
   return read_topic(options, instrument, frames, *bag, *topic);

@@ -8,6 +8,7 @@
 #include <string>
 #include <system_error>
 #include <unistd.h>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -156,8 +157,12 @@ class Guide {
     if (!check && !camera) all.insert(all.end(), {"--out", options_.rig});
     if (!step.joints.empty()) all.insert(all.end(), {"--joints", step.joints});
     all.insert(all.end(), step.arguments.begin(), step.arguments.end());
-    if (!options_.colour_matrix.empty()) all.insert(all.end(), {"--colour-matrix", options_.colour_matrix});
-    if (!options_.chroma_location.empty()) all.insert(all.end(), {"--chroma-location", options_.chroma_location});
+    const std::vector<std::pair<std::string, std::string>> of_frames{{"--eye", options_.eye},
+                                                                     {"--side-by-side", options_.side_by_side},
+                                                                     {"--colour-matrix", options_.colour_matrix},
+                                                                     {"--chroma-location", options_.chroma_location}};
+    for (const auto& [option, value] : of_frames)
+      if (!value.empty()) all.insert(all.end(), {option, value});
     if (camera) return all;
     if (!options_.instrument.empty()) all.insert(all.end(), {"--instrument", options_.instrument});
     if (options_.deinterlace) all.push_back("--deinterlace");

@@ -143,7 +143,7 @@ void check_operator_present(const ServoOptions& options) {
 int run(const ServoOptions& options) {
   options.web.check();
   check_operator_present(options);
-  const bool recorded = !options.replay.empty() && is_bag(options.replay);
+  const bool recorded = !bag_of(options.replay).empty();
   if (!options.replay.empty() && options.web.port)
     throw InputError("--web", "is for runs, expected none with --replay");
   if (!options.replay.empty() && options.enable_motion)
@@ -230,9 +230,11 @@ void add_result_options(Command command, ServoOptions& options) {
 
 void add_replay_options(Command command, ServoOptions& options) {
   command.add_option("--replay", options.replay,
-                     "A run's log.csv: decide everything again and compare every bit; a bag of ROS 1 or 2: decide on "
+                     "A run's log.csv: decide everything again and compare every bit; a bag of ROS 1 or 2, or a "
+                     "session of dvrk_data: decide on "
                      "the recorded images and joints as without --enable-motion");
-  add_image_topic_option(command, options.image_topic);
+  add_image_topic_option(command, options.recorded.image_topic);
+  add_eye_options(command, options.recorded);
   add_joint_topic_option(command, options.joint_topic);
 }
 

@@ -9,6 +9,7 @@
 #include <Eigen/Core>
 
 #include "apps/lapservo/cli/web_view.h"
+#include "apps/lapservo/inputs/frame_input.h"
 #include "lapservo/control/trajectory.h"
 #include "lapservo/servo/run.h"
 
@@ -17,8 +18,8 @@ namespace lapservo::app {
 /// Options of `lapservo servo`.
 struct ServoOptions {
   std::string rig, robot, instrument, camera, joint_limits, trajectory = "paper", method = "default", tracker,
-                                                            controller, delay = "estimate", out, replay, image_topic,
-                                                            joint_topic, control = "both", operator_present;
+                                                            controller, delay = "estimate", out, replay, joint_topic,
+                                                            control = "both", operator_present;
   std::vector<double> set_point, via, start, rcm_px, hide;
   std::vector<double> registration_error;  // 3 x mm
   double latency_ms = 80;
@@ -28,6 +29,7 @@ struct ServoOptions {
   int setpoint_readers = 1;
   bool force = false, enable_motion = false, strict = false;
   WebOptions web;
+  FrameOptions recorded;  // how the images of `replay` are read
 
   /// Else a topic does, or nobody has to.
   bool page_says_operator_present() const { return operator_present == "page"; }

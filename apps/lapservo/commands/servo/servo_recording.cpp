@@ -11,6 +11,7 @@
 #include "apps/lapservo/cli/progress.h"
 #include "apps/lapservo/commands/servo/run_watcher.h"
 #include "apps/lapservo/inputs/frame_input.h"
+#include "recordings/bag_topics.h"
 #include "recordings/open_bag.h"
 #include "recordings/replayed_run.h"
 
@@ -50,10 +51,16 @@ int decide_on_recording(const ServoOptions& options) {
   if (config.controller.mode == ControlMode::uncalibrated) forget_registration(config, options);
   const Trajectory trajectory = trajectory_of(options);
 
-  auto bag = open_bag(options.replay);
-  say_remark(options.replay, bag->remark());
-  ReplayedRun recorded(std::move(bag), options.image_topic, options.joint_topic, rig.instruments.front().name,
-                       joints_of(options, rig));
+  const std::string path = bag_of(options.replay);
+  const auto bag = open_bag(path);
+  const BagTopic* images = nullptr;  // a session's images have the times of the recorder
+  if (path == options.replay) {
+    images = &image_topic_of(*bag, options.recorded.image_topic);
+  } else {
+    say_remark(path, bag->remark());
+  }
+  ReplayedRun recorded(open_frames(options.replay, options.recorded, &rig.camera), *bag, images, options.joint_topic,
+                       rig.instruments.front().name, joints_of(options, rig));
   if (const double lead_s = recorded.arm_clock_lead_s(); std::abs(lead_s) > 0.3)
     std::printf("the arm's clock is %.2f s %s the camera's, by when both were recorded\n", std::abs(lead_s),
                 lead_s > 0 ? "ahead of" : "behind");

@@ -1,0 +1,220 @@
+#include "recordings/session.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <numeric>
+#include <optional>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "lapservo/core/error.h"
+
+namespace lapservo::internal {
+namespace {
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+constexpr auto index_type = "dvrk_data:index@1.0.0", sidecar_type = "dvrk_data:video_sidecar@1.0.0";
+
+const json& member(const json& object, const char* key) {
+  static const json none;
+  const auto found = object.is_object() ? object.find(key) : object.end();
+  return found != object.end() ? *found : none;
+}
+std::string text_in(const json& object, const char* key) {
+  const json& text = member(object, key);
+  return text.is_string() ? text.get<std::string>() : std::string();
+}
+const json& list_in(const json& object, const char* key) {
+  static const json empty = json::array();
+  const json& list = member(object, key);
+  return list.is_array() ? list : empty;
+}
+
+json read_json(const fs::path& path, const char* type, const json::parser_callback_t& each = nullptr) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file) throw InputError(path.string(), std::string("can't be read, expected JSON of ") + type);
+  json content = json::parse(file, each, false);
+  if (content.is_discarded()) throw InputError(path.string(), std::string("is damaged, expected JSON of ") + type);
+  if (const std::string found = text_in(content, "type"); found != type)
+    throw InputError(path.string(), "type", found, type);
+  return content;
+}
+
+// A file beside the index; of a longer path its name counts.
+fs::path beside(const fs::path& folder, const std::string& file) {
+  return folder / fs::path(file).filename();
+}
+
+std::optional<std::int64_t> time_in(const json& times, const char* key) {
+  const json& time = member(times, key);
+  const std::int64_t time_ns = time.is_number_integer() ? time.get<std::int64_t>() : 0;
+  return time_ns > 0 ? std::optional(time_ns) : std::nullopt;
+}
+
+std::optional<std::int64_t> preferred_time_ns(const json& frame) {
+  const json& times = member(member(frame, "cpu"), "realtime");
+  if (const auto of_one = time_in(times, "mono_source_ns")) return of_one;
+  const auto left = time_in(times, "left_source_ns"), right = time_in(times, "right_source_ns");
+  if (left && right) return std::midpoint(*left, *right);
+  if (left || right) return left ? left : right;
+  return time_in(times, "recorder_reception_ns");
+}
+
+struct Sidecar {
+  std::string layout;
+  std::vector<std::int64_t> times_ns;  // of the frames
+};
+
+Sidecar read_sidecar(const fs::path& path) {
+  Sidecar sidecar;
+  std::size_t wrong = 0;
+  // A frame's record has 20 numbers, an hour 100,000 of them: none is kept.
+  const auto take_frame = [&](int depth, json::parse_event_t event, json& parsed) {
+    if (event != json::parse_event_t::object_end || depth != 2 || !parsed.contains("frame_index")) return true;
+    const auto time_ns = preferred_time_ns(parsed);
+    wrong += !time_ns || parsed["frame_index"] != sidecar.times_ns.size();
+    sidecar.times_ns.push_back(time_ns.value_or(0));
+    return false;
+  };
+  sidecar.layout = text_in(read_json(path, sidecar_type, take_frame), "side_by_side");
+  if (wrong > 0 || sidecar.times_ns.empty())
+    throw InputError(path.string(),
+                     fmt::format("has {} frames, {} of them without a time or out of turn, expected each "
+                                 "frame's time",
+                                 sidecar.times_ns.size(), wrong));
+  return sidecar;
+}
+
+struct Part {
+  std::string video;
+  std::vector<std::int64_t> times_ns;
+};
+
+class SessionFrames : public FrameSource {
+ public:
+  SessionFrames(std::vector<Part> parts, const VideoReading& reading) : parts_(std::move(parts)), reading_(reading) {
+    open();
+  }
+
+  std::optional<Frame> next() override {
+    while (true) {
+      auto frame = video_->next();
+      if (!frame) {
+        end();
+        if (part_ + 1 == parts_.size()) return std::nullopt;
+        ++part_;
+        open();
+        continue;
+      }
+      const auto& times_ns = parts_[part_].times_ns;
+      const std::size_t place = in_part_++;
+      if (place >= times_ns.size()) continue;
+      if (last_ns_ && times_ns[place] <= *last_ns_) {
+        ++not_later_;
+        continue;
+      }
+      last_ns_ = times_ns[place];
+      frame->index = index_++;
+      frame->time_s = 1e-9 * static_cast<double>(*last_ns_ - first_ns());
+      return frame;
+    }
+  }
+  Kind kind() const override { return Kind::video; }
+  std::optional<int> frame_count() const override {
+    std::size_t count = 0;
+    for (const Part& part : parts_) count += part.times_ns.size();
+    return static_cast<int>(count);
+  }
+  double frames_per_second() const override { return video_->frames_per_second(); }
+  std::optional<double> first_stamp_s() const override { return 1e-9 * static_cast<double>(first_ns()); }
+  std::string remark() const override { return video_->remark(); }
+  bool is_srgb() const override { return video_->is_srgb(); }
+  bool is_lossy() const override { return video_->is_lossy(); }
+  std::string complaint() const override { return fmt::format("{}", fmt::join(complaints(), "; ")); }
+
+ private:
+  std::int64_t first_ns() const { return parts_.front().times_ns.front(); }
+  void open() {
+    video_ = open_frame_source(parts_[part_].video, 30, reading_);
+    in_part_ = 0;
+  }
+  void end() {
+    const Part& part = parts_[part_];
+    const std::string name = fs::path(part.video).filename().string();
+    if (const std::string text = video_->complaint(); !text.empty()) complaints_.push_back(name + " " + text);
+    if (in_part_ != part.times_ns.size())
+      complaints_.push_back(fmt::format("{} has {} frames and {} times: they may not belong together", name, in_part_,
+                                        part.times_ns.size()));
+  }
+  std::vector<std::string> complaints() const {
+    std::vector<std::string> all = complaints_;
+    if (not_later_ > 0)
+      all.push_back(fmt::format("{} frames are left out, whose time is not later than the one before", not_later_));
+    return all;
+  }
+
+  std::vector<Part> parts_;
+  VideoReading reading_;
+  std::unique_ptr<FrameSource> video_;
+  std::size_t part_ = 0, in_part_ = 0;
+  int index_ = 0, not_later_ = 0;
+  std::optional<std::int64_t> last_ns_;
+  std::vector<std::string> complaints_;
+};
+
+json index_of(const fs::path& folder) {
+  return read_json(folder / "index.json", index_type);
+}
+
+// The stream of that name, or the only one with videos.
+json stream_of(const fs::path& folder, const std::string& name) {
+  std::vector<std::string> names;
+  json found;
+  const json index = index_of(folder);
+  for (const json& stream : list_in(index, "streams")) {
+    if (list_in(stream, "videos").empty() || (!name.empty() && text_in(stream, "name") != name)) continue;
+    names.push_back(text_in(stream, "name"));
+    found = stream;
+  }
+  if (names.size() != 1)
+    throw InputError(folder.string(),
+                     fmt::format("has {} video streams{} ({}), expected one, named by --image-topic", names.size(),
+                                 name.empty() ? "" : " of the name " + name, fmt::join(names, ", ")));
+  return found;
+}
+
+}  // namespace
+
+bool is_session(const std::string& path) {
+  std::error_code error;
+  std::ifstream file(fs::path(path) / "index.json", std::ios::binary);
+  if (!fs::is_directory(path, error) || !file) return false;
+  return text_in(json::parse(file, nullptr, false), "type").starts_with("dvrk_data:index@");
+}
+
+std::string bag_of_session(const std::string& folder) {
+  const std::string bag = text_in(index_of(folder), "rosbags");
+  return bag.empty() ? std::string() : beside(folder, bag).string();
+}
+
+Session::Session(const std::string& folder, const std::string& stream, const VideoReading& reading) {
+  std::vector<Part> parts;
+  const json found = stream_of(folder, stream);
+  for (const json& video : list_in(found, "videos")) {
+    const fs::path file = beside(folder, text_in(video, "file"));
+    Sidecar sidecar = read_sidecar(fs::path(file).replace_extension(".json"));
+    layout_ = sidecar.layout == "LR" || sidecar.layout == "RL" ? sidecar.layout : std::string();
+    parts.push_back({file.string(), std::move(sidecar.times_ns)});
+  }
+  frames_ = std::make_unique<SessionFrames>(std::move(parts), reading);
+}
+
+}  // namespace lapservo::internal
