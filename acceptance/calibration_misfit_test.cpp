@@ -12,12 +12,14 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <opencv2/imgproc.hpp>
 
 #include "acceptance/laboratory.h"
 #include "lapservo/calibration/camera/camera_calibration.h"
 #include "lapservo/calibration/marker/marker_calibration.h"
+#include "lapservo/calibration/registration/alignment.h"
 #include "lapservo/calibration/registration/registration.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/core/random.h"
@@ -186,6 +188,35 @@ TEST(CalibrationMisfit, Registration) {
   EXPECT_EQ(clean.refused(), 0);
   EXPECT_EQ(departed.wrong(), 0);
   EXPECT_GE(departed.named(), 0.8);
+}
+
+// --- alignment
+
+// Videos at 30 images a second, and joints by a clock that is up to 30 s off.
+TEST(CalibrationMisfit, Alignment) {
+  constexpr double largest_s = 2e-3;
+  Answers answers;
+  double worst_s = 0;
+  for (Recording recording : recordings()) {
+    recording.compressed = true;
+    Swing swung = swing(recording);
+    Instrument named = swung.truth.instruments[0];
+    const double apart_s = Random(recording.seed + 900).uniform(-30, 30), delay_s = *named.image_delay_s + apart_s;
+    named.camera_from_rcm.reset(), named.image_delay_s.reset();
+    for (double& time_s : swung.joints.time_s) time_s -= apart_s;
+    const Alignment found = align(named, swung.poses, swung.joints, "joints");
+    const double off_s = found.delay_s - delay_s;
+    answers.add(fmt::format("{:.2f} s, off by {:.3f} ms", delay_s, 1e3 * off_s), "",
+                {found.refusal, {off_s / found.sigma_delay_s}});
+    if (found.refusal.empty()) worst_s = std::max(worst_s, std::abs(off_s));
+    EXPECT_FALSE(found.drifts()) << found.drift_ppm;
+  }
+  answers.print("alignment");
+  EXPECT_EQ(answers.refused() + answers.wrong(), 0);
+  EXPECT_LT(worst_s, largest_s);
+  if (recordings().size() < 20) return;
+  EXPECT_GT(answers.error_over_sigma(), 0.7);
+  EXPECT_LT(answers.error_over_sigma(), 1.4);
 }
 
 // --- camera

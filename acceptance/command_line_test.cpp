@@ -670,6 +670,32 @@ TEST_F(CommandLine, CalibrateRegistrationWritesWhereTheArmStands) {
   EXPECT_NEAR(found.camera_from_rcm->translation.z(), 0.059220, 3e-4);
   EXPECT_NEAR(found.image_delay_s.value(), clock_s, 5e-3);
 
+  // The same by a clock that is 20 s off, beside those that do not move.
+  const CsvTable table = CsvTable::read("in/joints.csv");
+  std::string later = "time_s,yaw,pitch,insertion,roll\n", at_rest = later;
+  for (std::size_t i = 0; i < table.rows(); ++i) {
+    const std::string time = std::to_string(table.number(i, "time_s") + 20) + ",";
+    later += time + row({table.number(i, "yaw"), table.number(i, "pitch"), table.number(i, "insertion"),
+                         table.number(i, "roll")});
+    at_rest += time + "0,0,0.1,0\n";
+  }
+  const std::string align =
+      "align in/swing --fps 8 --rig " + unregistered + " --out out/aligned.yaml --report out/align.html";
+  EXPECT_EQ(run(align + " --joints " + in("at_rest.csv", at_rest)), 1);
+  expect_in(errors(), "yaw moved by 0.00 rad");
+  EXPECT_FALSE(fs::exists("out/aligned.yaml"));
+  EXPECT_EQ(run(align), 2);
+  expect_in(errors(), "--joints: is missing");
+  expect_done("align --help");
+  expect_in(output(), "Example");
+  expect_done(align + " --joints " + in("later.csv", later));
+  expect_in(output(), "no drift of the clocks shows");
+  EXPECT_NEAR(load_rig("out/aligned.yaml").instruments[0].image_delay_s.value(), clock_s - 20, 5e-3);
+  expect_in(read_file("out/align.html"), "as the marker shows it");
+  expect_done(
+      "calibrate registration in/swing --fps 8 --rig out/aligned.yaml --out out/late.yaml --joints in/later.csv");
+  EXPECT_NEAR(load_rig("out/late.yaml").instruments[0].image_delay_s.value(), clock_s - 20, 5e-3);
+
   // The same swing tests both rigs: the first has no calibration yet.
   const std::string check = "check in/swing --fps 8 --joints in/joints.csv --rig ";
   expect_done(check + "out/rig.yaml --out out/check.html");

@@ -71,7 +71,8 @@ std::vector<std::string> joint_names_in_bag(const Bag& bag, const BagTopic& topi
   return reading ? reading->names : std::vector<std::string>();
 }
 
-JointRecording joints_in_bag(const Bag& bag, const BagTopic& topic, const Joints& joints, double begin_s) {
+JointRecording joints_in_bag(const Bag& bag, const BagTopic& topic, const Joints& joints,
+                             std::optional<double> begin_s) {
   const std::string source = bag.path() + ": " + topic.name;
   JointRecording recording;
   std::vector<std::string> other_names;  // of the latest message of another arm
@@ -82,10 +83,12 @@ JointRecording joints_in_bag(const Bag& bag, const BagTopic& topic, const Joints
     other_names = reading->names;
     return false;
   });
+  double first_s = 0;
   while (const auto message = messages.next()) {
     const auto values = *chosen(std::get<JointMessage>(message->message), joints, source);
     if (std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); })) {
-      recording.time_s.push_back(message->time_s - begin_s);
+      if (recording.time_s.empty()) first_s = begin_s.value_or(message->time_s);
+      recording.time_s.push_back(message->time_s - first_s);
       recording.joints.push_back(values);
     } else {
       ++recording.no_numbers;
@@ -100,7 +103,7 @@ JointRecording joints_in_bag(const Bag& bag, const BagTopic& topic, const Joints
   if (recording.time_s.size() < 2)
     throw InputError(source, fmt::format("has {} readings that are numbers with a stamp, expected two or more",
                                          recording.time_s.size()));
-  check_clock(recording, begin_s, source);
+  if (begin_s) check_clock(recording, *begin_s, source);
   check_units(recording, joints, source);
   return recording;
 }

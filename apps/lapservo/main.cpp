@@ -4,7 +4,7 @@
 int main(int argc, char** argv) {
   using namespace lapservo::app;
   return run_program(argc, argv,
-                     {add_track, add_view, add_calibrate, add_check, add_experiment,
+                     {add_track, add_view, add_calibrate, add_align, add_check, add_experiment,
 #ifdef LAPSERVO_BAGS
                       add_record,
 #endif

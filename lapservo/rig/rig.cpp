@@ -289,7 +289,7 @@ Instrument parse_instrument(const YamlField& field) {
   }
   if (const YamlField joints = field["joints"]; joints.present()) instrument.joints = parse_joints(joints);
   if (const YamlField delay = field["image_delay_s"]; delay.present())
-    instrument.image_delay_s = delay.number_between(-10, 10, "-10 to 10 (seconds)");
+    instrument.image_delay_s = delay.number_between(-60, 60, "-60 to 60 (seconds)");
   instrument.sigma_image_delay_s = sigma_in(field, "sigma_image_delay_s");
   return instrument;
 }

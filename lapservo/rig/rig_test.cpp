@@ -329,7 +329,7 @@ const Complaints impossible_joints{
      joints + "offset[2]: is -156, expected an offset within 100 rad or m"},
     {good + "    joints: {names: " + names + ", sign: " + sign + ", offset: " + offset + ", scale: 1}\n",
      joints + unknown("scale", "names")},
-    {good + "    image_delay_s: 80\n", "instruments[0].image_delay_s: is 80, expected -10 to 10 (seconds)"},
+    {good + "    image_delay_s: 80\n", "instruments[0].image_delay_s: is 80, expected -60 to 60 (seconds)"},
 };
 
 const Complaints confusable_instruments{

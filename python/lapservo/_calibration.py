@@ -243,7 +243,7 @@ def calibrate_registration(
     """Measures where the arm stands before the camera, its joints' signs and offsets, and the video's delay.
 
     frames: of the marker in motion, or a CSV of observations that were tracked without camera_from_rcm; joints: a CSV's
-    path, or arrays by name (a dict, a DataFrame), time_s [s] and four joints [rad, rad, m, rad], by a clock up to 3 s off; without any only
+    path, or arrays by name (a dict, a DataFrame), time_s [s] and four joints [rad, rad, m, rad], by a clock up to 30 s off; without any only
     the RCM's place is measured. rig: a Rig or its path; fps: of a folder or of arrays.
 
     Raises InputError for what can't be used, and with `problem` where the frames don't suffice.

@@ -5,6 +5,7 @@
 namespace lapservo::app {
 
 // Each adds its subcommand (one file each) and, when the command line names it, sets `run`.
+void add_align(Command app, Run& run);
 void add_calibrate(Command app, Run& run);
 void add_calibrate_all(Command calibrate, Run& run);
 void add_calibrate_camera(Command calibrate, Run& run);

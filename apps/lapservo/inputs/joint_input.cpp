@@ -38,12 +38,9 @@ JointInput read_table(const CalibrateOptions& options, const Instrument& instrum
 JointInput read_topic(const CalibrateOptions& options, const Instrument& instrument, const FrameSource* frames,
                       const Bag& bag, const BagTopic& topic) {
   const auto begin_s = frames ? frames->first_stamp_s() : std::nullopt;
-  if (!begin_s)
-    throw InputError("--joints", "is the bag " + bag.path() + ", expected a CSV: " + options.input +
-                                     " is no bag, and so has no stamps that would go with a bag's");
   const Joints joints =
       joints_of(instrument, joint_names_in_bag(bag, topic), bag.path() + ": " + topic.name, options.rig);
-  return reported({joints, joints_in_bag(bag, topic, joints, *begin_s), bag.path()});
+  return reported({joints, joints_in_bag(bag, topic, joints, begin_s), bag.path()});
 }
 
 }  // namespace

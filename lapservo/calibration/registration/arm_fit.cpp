@@ -116,8 +116,10 @@ std::vector<JointFault> possible_faults(const Joints& joints, const std::vector<
 std::optional<ArmFit> fit_arm(const Instrument& instrument, const ArmStart& start, const JointRecording& recording,
                               const ArmFaults& free, const AtIteration& at_iteration) {
   auto faults = sized_joint_faults(instrument.joints.value(), start.poses);
-  const auto is_focal = [](const JointFault& fault) { return !fault.mend; };
-  if (std::any_of(free.joints.begin(), free.joints.end(), is_focal)) std::erase_if(faults, is_focal);
+  std::erase_if(faults, [&](const JointFault& held) {
+    return std::any_of(free.joints.begin(), free.joints.end(),
+                       [&](const JointFault& fault) { return fault.text(0) == held.text(0); });
+  });
   auto fitted = fit_model(instrument, start, recording, free, faults, at_iteration);
   if (!fitted) return std::nullopt;
   ArmFit result{std::move(fitted->model), std::move(fitted->fit), {}, {}, {}};

@@ -1,6 +1,7 @@
 #include "lapservo/calibration/registration/arm_start.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include <fmt/format.h>
 
@@ -12,7 +13,8 @@
 namespace lapservo::internal {
 namespace {
 
-constexpr double largest_delay_s = 3.2;
+// Clocks that are set by the network, with a delay of the images.
+constexpr double usual_delay_s = 3.2;
 
 // Frames that the recording covers whichever way the fit moves the delay, and the joints there.
 void keep_common(const std::vector<TimedPose>& poses, const JointRecording& recording, ArmStart& start) {
@@ -50,6 +52,14 @@ std::string too_few_poses(std::size_t poses) {
   return fmt::format("the marker was found in {} frames, at least {} are needed", poses, min_registration_poses);
 }
 
+std::string ambiguous_delay(const ArmStart& start) {
+  return fmt::format(
+      "the motion repeats: at a delay of {:.2f} s the joints explain it about as well as at {:.2f} s: swing "
+      "irregularly, "
+      "or cut both recordings to less than a period",
+      start.other_delays_s.front(), start.delay_s);
+}
+
 ArmStart start_arm(const Instrument& instrument, const std::vector<TimedPose>& poses, const JointRecording& recording,
                    const std::string& source) {
   ArmStart start;
@@ -73,14 +83,22 @@ ArmStart start_arm(const Instrument& instrument, const std::vector<TimedPose>& p
     start.refusal = fmt::format(
         "the joints do not move as the marker does ({}): is it this arm's recording, are names in the order theta, "
         "phi, "
-        "rho, psi, do both clocks run within 3 s of each other ({})",
+        "rho, psi, do both clocks run within 30 s of each other ({})",
         how, clocks_text(poses, recording));
     return start;
   };
-  const DelaySearch search = search_delay(poses, rho_m, recording, about_s, largest_delay_s);
-  if (search.explained < least_explained)
-    return foreign(fmt::format("{:.0f} % of the motion is explained", 100 * search.explained));
-  start.delay_s = search.delay_s;
+  std::vector<DelayMatch> matches = search_delay(poses, rho_m, recording, about_s, largest_delay_s);
+  if (matches.empty() || matches.front().explained < least_explained)
+    return foreign(
+        fmt::format("{:.0f} % of the motion is explained", matches.empty() ? 0 : 100 * matches.front().explained));
+  std::stable_partition(matches.begin(), matches.end(),
+                        [&](const DelayMatch& match) { return std::abs(match.delay_s - about_s) <= usual_delay_s; });
+  const DelayMatch& match = matches.front();
+  start.delay_s = match.delay_s;
+  for (auto other = matches.begin() + 1; other != matches.end(); ++other)
+    start.other_delays_s.push_back(other->delay_s);
+  if (!start.other_delays_s.empty() && std::abs(start.delay_s - about_s) > usual_delay_s)
+    return start.refusal = ambiguous_delay(start), start;
   keep_common(poses, recording, start);
   if (start.poses.size() < min_registration_poses)
     return start.refusal = fmt::format("{} frames lie within the recording of the joints, at least {} are needed",
@@ -89,7 +107,7 @@ ArmStart start_arm(const Instrument& instrument, const std::vector<TimedPose>& p
   start.ranges = ranges_of(start.joints);
   if (const std::string still = still_joints(joints, start.ranges); !still.empty())
     return start.refusal = "while the marker is seen, " + still + ": " + swing_more, start;
-  start.guess = guess_arm(instrument, start.poses, start.joints, meeting->point_m, search.rho_per_joint);
+  start.guess = guess_arm(instrument, start.poses, start.joints, meeting->point_m, match.rho_per_joint);
   if (start.guess.misfit_rad > max_misfit_rad)
     return foreign(fmt::format("axes miss by {:.2f} rad", start.guess.misfit_rad));
   if (const auto open = start.guess.open_sign)

@@ -29,10 +29,18 @@ struct ArmStart {
   JointRanges ranges;  ///< of these
   ArmGuess guess;
   double delay_s = 0;
+  std::vector<double> other_delays_s;  ///< explain the motion about as well
 };
 
+/// Says that other_delays_s, of which there are some, explain the motion too.
+std::string ambiguous_delay(const ArmStart& start);
+
+/// How far the clocks of frames and joints may differ, beyond the delay that the instrument has.
+inline constexpr double largest_delay_s = 31;
+
 /// Delay, signs and a first registration, whatever of them the instrument knows: refused where a joint stood still, or
-/// where its sign does not show. Throws InputError when the recording
+/// where its sign does not show. Where the motion repeats, so that several delays explain it, it is the best one
+/// near the instrument's own. Throws InputError when the recording
 /// and the frames have no time in common, naming `source`.
 ArmStart start_arm(const Instrument& instrument, const std::vector<TimedPose>& poses, const JointRecording& recording,
                    const std::string& source);

@@ -2,17 +2,19 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
+#include <utility>
 
 #include <Eigen/LU>
 
+#include "lapservo/calibration/fit/some_of.h"
 #include "lapservo/core/angles.h"
 
 namespace lapservo::internal {
 namespace {
 
-constexpr double step_s = 0.01, lag_s = 0.2;
-constexpr std::size_t fewest = 15;
+// A part of a slow motion that is shorter than `least_shared_s` looks like many others.
+constexpr double coarse_s = 0.05, fine_s = 1e-3, lag_s = 0.2, least_shared_s = 8;
+constexpr std::size_t fewest = 15, enough = 300;
 
 // Least squares of one number by two others, with or without a constant.
 class Regression {
@@ -65,46 +67,87 @@ std::vector<Step> steps_of(const std::vector<TimedPose>& poses) {
   return steps;
 }
 
-struct Trial {
-  double score = 0, explained = 0, rho_per_joint = 0;
+class Matcher {
+ public:
+  Matcher(const std::vector<TimedPose>& poses, const std::vector<double>& rho_m, const JointRecording& recording)
+      : recording_(recording), steps_(some_of(steps_of(poses), enough)) {
+    std::vector<Place> places;
+    for (std::size_t i = 0; i < poses.size(); ++i) places.push_back({poses[i].time_s, rho_m[i]});
+    places_ = some_of(std::move(places), enough);
+    const double poses_s = poses.back().time_s - poses.front().time_s;
+    const double shorter_s = std::min(poses_s, recording.time_s.back() - recording.time_s.front());
+    const double needed_s = std::max(shorter_s / 4, std::min(least_shared_s, 0.75 * shorter_s));
+    const double part = needed_s / std::max(1e-9, poses_s);
+    needed_ = std::max(fewest, static_cast<std::size_t>(part * static_cast<double>(places_.size())));
+  }
+
+  // A score below 0 where the recordings share too little.
+  DelayMatch at(double delay_s) const {
+    Regression insertion(true), speed(false), turn(false);
+    for (const Place& place : places_)
+      if (const auto at = recording_.at(place.time_s - delay_s)) insertion.add(place.rho_m, (*at)[2], 0);
+    for (const Step& step : steps_) {
+      const auto from = recording_.at(step.from_s - delay_s), to = recording_.at(step.to_s - delay_s);
+      if (!from || !to) continue;
+      const double theta = (*to)[0] - (*from)[0], phi = (*to)[1] - (*from)[1], psi = (*to)[3] - (*from)[3];
+      speed.add(step.axis_rad_squared, theta * theta, phi * phi);
+      if (std::abs(psi) < 2.5) turn.add(step.turn_rad, psi, theta);
+    }
+    if (insertion.count() < needed_ || speed.count() < fewest) return {delay_s, -1};
+    DelayMatch match{delay_s, 0, 0, insertion.slopes()[0]};
+    for (const Regression* one : {&insertion, &speed, &turn}) {
+      match.score -= std::log1p(-one->explained());
+      match.explained = std::max(match.explained, one->explained());
+    }
+    return match;
+  }
+
+  DelayMatch refined(DelayMatch best) const {
+    for (double step_s = coarse_s / 2; step_s > fine_s; step_s /= 2)
+      for (const double delay_s : {best.delay_s - step_s, best.delay_s + step_s})
+        if (const DelayMatch match = at(delay_s); match.score > best.score) best = match;
+    return best;
+  }
+
+ private:
+  struct Place {
+    double time_s, rho_m;
+  };
+
+  const JointRecording& recording_;
+  std::vector<Step> steps_;
+  std::vector<Place> places_;
+  std::size_t needed_;
 };
 
-std::optional<Trial> try_delay(const std::vector<TimedPose>& poses, const std::vector<double>& rho_m,
-                               const std::vector<Step>& steps, const JointRecording& recording, double delay_s) {
-  Regression insertion(true), speed(false), turn(false);
-  for (std::size_t i = 0; i < poses.size(); ++i)
-    if (const auto at = recording.at(poses[i].time_s - delay_s)) insertion.add(rho_m[i], (*at)[2], 0);
-  for (const Step& step : steps) {
-    const auto from = recording.at(step.from_s - delay_s), to = recording.at(step.to_s - delay_s);
-    if (!from || !to) continue;
-    const double theta = (*to)[0] - (*from)[0], phi = (*to)[1] - (*from)[1], psi = (*to)[3] - (*from)[3];
-    speed.add(step.axis_rad_squared, theta * theta, phi * phi);
-    if (std::abs(psi) < 2.5) turn.add(step.turn_rad, psi, theta);
-  }
-  if (insertion.count() < std::max(fewest, poses.size() / 3) || speed.count() < fewest) return std::nullopt;
-  Trial trial{0, 0, insertion.slopes()[0]};
-  for (const Regression* one : {&insertion, &speed, &turn}) {
-    trial.score -= std::log1p(-one->explained());
-    trial.explained = std::max(trial.explained, one->explained());
-  }
-  return trial;
+void sort_by_score(std::vector<DelayMatch>& matches) {
+  std::sort(matches.begin(), matches.end(), [](const auto& a, const auto& b) { return a.score > b.score; });
 }
 
 }  // namespace
 
-DelaySearch search_delay(const std::vector<TimedPose>& poses, const std::vector<double>& rho_m,
-                         const JointRecording& recording, double about_s, double reach_s) {
-  const auto steps = steps_of(poses);
-  DelaySearch best;
-  double best_score = -1;
-  for (int i = -static_cast<int>(reach_s / step_s); i * step_s <= reach_s; ++i) {
-    const double delay_s = about_s + i * step_s;
-    const auto trial = try_delay(poses, rho_m, steps, recording, delay_s);
-    if (!trial || trial->score <= best_score) continue;
-    best_score = trial->score;
-    best = {delay_s, trial->explained, trial->rho_per_joint};
+std::vector<DelayMatch> search_delay(const std::vector<TimedPose>& poses, const std::vector<double>& rho_m,
+                                     const JointRecording& recording, double about_s, double reach_s) {
+  // So many peaks, the highest at coarse steps, are refined. The unexplained part of a rival is at most twice that of
+  // the best, in each of the three.
+  constexpr std::size_t peaks_to_refine = 16;
+  const double rival = 3 * std::log(2.0);
+  const Matcher matcher(poses, rho_m, recording);
+  const int steps = static_cast<int>(reach_s / coarse_s);
+  std::vector<DelayMatch> all, peaks;
+  for (int i = -steps; i <= steps; ++i) all.push_back(matcher.at(about_s + i * coarse_s));
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const double before = i > 0 ? all[i - 1].score : -1, after = i + 1 < all.size() ? all[i + 1].score : -1;
+    if (all[i].score >= 0 && all[i].score >= before && all[i].score > after) peaks.push_back(all[i]);
   }
-  return best;
+  sort_by_score(peaks);
+  peaks.resize(std::min(peaks.size(), peaks_to_refine));
+  for (DelayMatch& peak : peaks) peak = matcher.refined(peak);
+  sort_by_score(peaks);
+  std::erase_if(peaks, [best = peaks.empty() ? 0 : peaks.front().score, rival](const DelayMatch& peak) {
+    return peak.score < best - rival;
+  });
+  return peaks;
 }
 
 }  // namespace lapservo::internal

@@ -69,20 +69,6 @@ std::vector<double> clock_starts(double images_per_s) {
   return starts;
 }
 
-JointFault clock_fault(double period_s) {
-  return {[=](double size) {
-            return fmt::format(
-                "the images' clock runs {:.4f} times as fast as the joints': if they are {:.4g} images a second, "
-                "read as {:.4g}, give --fps; else stamp both by one clock",
-                1 + size, (1 + size) / period_s, 1 / period_s);
-          },
-          [](JointRecording& r, double size) {
-            const double first_s = r.time_s.front();
-            for (double& time_s : r.time_s) time_s = first_s + (1 + size) * (time_s - first_s);
-          },
-          1e-4, 0, clock_starts(1 / period_s)};
-}
-
 JointFault lost_frames_fault(double from_s) {
   constexpr double least_lost_s = 8e-3;  // half a frame of the fastest cameras
   return {[=](double size) {
@@ -136,6 +122,21 @@ JointFault focal_fault() {
           0.3};
 }
 
+JointFault clock_fault(const std::vector<TimedPose>& poses) {
+  const double period_s = frame_period_s(poses);
+  return {[=](double size) {
+            return fmt::format(
+                "the images' clock runs {:.4f} times as fast as the joints': if they are {:.4g} images a second, "
+                "read as {:.4g}, give --fps; else stamp both by one clock",
+                1 + size, (1 + size) / period_s, 1 / period_s);
+          },
+          [](JointRecording& r, double size) {
+            const double first_s = r.time_s.front();
+            for (double& time_s : r.time_s) time_s = first_s + (1 + size) * (time_s - first_s);
+          },
+          1e-4, 0, clock_starts(1 / period_s)};
+}
+
 std::vector<JointFault> sized_joint_faults(const Joints& joints, const std::vector<TimedPose>& poses) {
   constexpr int parts = 8;
   std::vector<JointFault> faults;
@@ -144,7 +145,7 @@ std::vector<JointFault> sized_joint_faults(const Joints& joints, const std::vect
     for (std::size_t by = 0; by < 4; ++by)
       if (by != j && !is_length(by)) faults.push_back(coupling_fault(joints, j, by));
   }
-  faults.push_back(clock_fault(frame_period_s(poses))), faults.push_back(focal_fault());
+  faults.push_back(clock_fault(poses)), faults.push_back(focal_fault());
   const double first_s = poses.front().time_s, span_s = poses.back().time_s - first_s;
   for (int part = 1; part < parts; ++part) faults.push_back(lost_frames_fault(first_s + span_s * part / parts));
   return faults;

@@ -26,6 +26,9 @@ struct JointFault {
 /// Another focal length of the camera than that by which the poses were found.
 JointFault focal_fault();
 
+/// An images' clock that runs (1 + size) times as fast as the joints', whose stamps it mends about the first one.
+JointFault clock_fault(const std::vector<TimedPose>& poses);
+
 /// Scales, couplings and times of the joints, the clock, frames that are lost, the focal length: faults with a size, of
 /// which 0 is none.
 std::vector<JointFault> sized_joint_faults(const Joints& joints, const std::vector<TimedPose>& poses);

@@ -12,84 +12,19 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/calibration/registration/registration_measurement.h"
+#include "lapservo/calibration/registration/test_motion.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/core/atomic_file.h"
 #include "lapservo/core/random.h"
 #include "lapservo/geometry/rotation.h"
 #include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/rig/joint_conversion.h"
-#include "lapservo/robot/backlash.h"
 #include "lapservo/testing/input_error.h"
-#include "lapservo/testing/rigs.h"
 #include "lapservo/testing/temporary_folder.h"
 
 namespace lapservo::internal {
 namespace {
 using lapservo::testing::input_error;
-
-// An arm in smooth motion, its joints read at 100 Hz, its marker seen 30 times a second with the noise that its sigmas
-// say.
-struct Motion {
-  double seconds = 20, delay_s = 0.08;
-  std::array<double, 4> swing{1, 1, 1, 1};  // of each joint's usual one
-  double common_turn_rad = 0;               // of all frames: the film's and the print's
-  std::array<double, 4> sign{1, -1, 1, -1}, offset{0.2, 1.5, -0.02, 0.7}, backlash{};
-  std::uint64_t seed = 1;
-};
-
-struct Recorded {
-  Instrument truth;
-  std::vector<TimedPose> poses;
-  JointRecording recording;
-};
-
-JointVector motion_at(double t, const std::array<double, 4>& swing, std::uint64_t seed) {
-  const double p = 0.3 * static_cast<double>(seed);
-  return {0.2 + swing[0] * 0.35 * std::sin(0.9 * t + p), 1.45 + swing[1] * 0.25 * std::sin(1.3 * t + 2 * p),
-          0.11 + swing[2] * 0.02 * std::sin(0.7 * t + 3 * p), swing[3] * 1.2 * std::sin(0.8 * t + p)};
-}
-
-Recorded recorded(const Motion& motion) {
-  Recorded result;
-  result.truth = lapservo::testing::paper_test_rig().instruments[0];
-  result.truth.joints = Joints{{"yaw", "pitch", "insertion", "roll"}, motion.sign, motion.offset};
-  result.truth.image_delay_s = motion.delay_s;
-  const Joints& joints = *result.truth.joints;
-  Random random(motion.seed);
-  std::array<Backlash, 4> gaps;
-  std::vector<std::array<double, 4>> shaft;
-  constexpr double dt = 1e-3;
-  const int count = static_cast<int>(motion.seconds / dt);
-  for (int i = 0; i < count; ++i) {
-    const Eigen::Vector4d q = motion_at(i * dt, motion.swing, motion.seed).vector();
-    std::array<double, 4> reading, behind;
-    for (std::size_t j = 0; j < 4; ++j) {
-      reading[j] = (q[static_cast<Eigen::Index>(j)] - joints.offset[j]) / joints.sign[j];
-      if (i == 0) gaps[j] = Backlash(reading[j]);
-      gaps[j].follow(reading[j], motion.backlash[j]);
-      behind[j] = joints.sign[j] * gaps[j].instrument(motion.backlash[j]) + joints.offset[j];
-    }
-    shaft.push_back(behind);
-    if (i % 10 == 0) result.recording.time_s.push_back(i * dt), result.recording.joints.push_back(reading);
-  }
-  for (int i = 0; i < count; i += 33) {
-    const auto& q = shaft[static_cast<std::size_t>(i)];
-    const Rigid3 exact = camera_from_marker(
-        result.truth.marker, *result.truth.camera_from_rcm * rcm_from_unrolled({q[0], q[1], q[2], q[3]}), q[3]);
-    TimedPose pose;
-    pose.time_s = i * dt + motion.delay_s;
-    Observation::MarkerPose& seen = pose.marker;
-    seen.sigma_xy_m = 1e-5, seen.sigma_z_m = 1e-4, seen.sigma_axis_rad = 1e-3, seen.sigma_roll_rad = 1e-3;
-    const Eigen::Vector3d ray = exact.translation.normalized(), side = ray.unitOrthogonal();
-    const auto n = [&] { return random.normal(); };
-    seen.camera_from_marker.translation =
-        exact.translation + 1e-4 * n() * ray + 1e-5 * (n() * side + n() * ray.cross(side));
-    const Eigen::Vector3d turn(7e-4 * n(), 7e-4 * n(), 1e-3 * n() + motion.common_turn_rad);
-    seen.camera_from_marker.rotation = exact.rotation * Eigen::AngleAxisd(turn.norm(), turn.normalized());
-    result.poses.push_back(pose);
-  }
-  return result;
-}
 
 // Where an arm as the instrument has it puts the marker.
 Rigid3 marker_at(const Instrument& instrument, const std::array<double, 4>& readings) {
@@ -99,15 +34,6 @@ Rigid3 marker_at(const Instrument& instrument, const std::array<double, 4>& read
 
 bool has(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
-}
-
-// A user's joints: names only.
-Instrument with_names_only(Instrument instrument) {
-  const double theta_offset = instrument.joints->offset[0];
-  instrument.camera_from_rcm.reset(), instrument.image_delay_s.reset();
-  instrument.joints->sign = {instrument.joints->sign[0], 1, 1, 1};
-  instrument.joints->offset = {theta_offset, 0, 0, 0};
-  return instrument;
 }
 
 Registration registered_by(const Recorded& data, const Instrument& believed) {

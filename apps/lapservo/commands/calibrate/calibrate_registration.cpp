@@ -121,7 +121,7 @@ void add_calibrate_registration(Command parent, Run& run_later) {
   command.footer(
       "Swing the instrument by 0.5 rad in both directions, insert and withdraw it by 20 mm, turn it by 2 rad, all of "
       "it\n"
-      "smoothly for 10 to 60 s, the marker in view. Clocks of joints and video may differ by up to 3 s. theta's "
+      "smoothly for 10 to 60 s, the marker in view. Clocks of joints and video may differ by up to 30 s. theta's "
       "offset\n"
       "stays the rig's: camera_from_rcm turns with it.\n"
       "Example:\n  lapservo calibrate registration motion.mp4 --joints joints.csv --rig rig.yaml --out rig.yaml");
