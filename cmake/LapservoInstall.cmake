@@ -16,6 +16,21 @@ install(FILES ${PROJECT_BINARY_DIR}/lapservoConfig.cmake ${PROJECT_BINARY_DIR}/l
 install(DIRECTORY configs/ DESTINATION ${LAPSERVO_INSTALL_CONFIGSDIR})
 install(FILES acceptance/frames/png/0000.png acceptance/frames/png/rig.yaml DESTINATION ${CMAKE_INSTALL_DATADIR}/lapservo/example)
 install(DIRECTORY transports/ros2/msg/lapservo_msgs DESTINATION ${CMAKE_INSTALL_DATADIR}/lapservo)
+# What `ros2 launch lapservo` and other tools of ROS 2 look for: the package's name in an index, and its launch files.
+install(FILES package.xml DESTINATION ${CMAKE_INSTALL_DATADIR}/lapservo)
+install(DIRECTORY transports/ros2/launch DESTINATION ${CMAKE_INSTALL_DATADIR}/lapservo)
+file(WRITE ${PROJECT_BINARY_DIR}/ament_index/lapservo "")
+install(FILES ${PROJECT_BINARY_DIR}/ament_index/lapservo DESTINATION ${CMAKE_INSTALL_DATADIR}/ament_index/resource_index/packages)
+# colcon.pkg names these: colcon itself puts packages of the build type cmake into no index.
+file(WRITE ${PROJECT_BINARY_DIR}/hook/ament_prefix_path.dsv "prepend-non-duplicate;AMENT_PREFIX_PATH;\n")
+file(WRITE ${PROJECT_BINARY_DIR}/hook/ament_prefix_path.sh "_colcon_prepend_unique_value AMENT_PREFIX_PATH \"$COLCON_CURRENT_PREFIX\"\n")
+install(DIRECTORY ${PROJECT_BINARY_DIR}/hook DESTINATION ${CMAKE_INSTALL_DATADIR}/lapservo)
+# A test that needs nothing but the tool: `colcon test` has it without the others, too.
+find_program(LAPSERVO_PYTHON python3)
+if(LAPSERVO_PYTHON AND NOT LAPSERVO_SANITIZE)
+  add_test(NAME packaging.ros2 COMMAND ${LAPSERVO_PYTHON} ${PROJECT_SOURCE_DIR}/transports/ros2/test_ros2_package.py
+           $<TARGET_FILE:lapservo_app> ${PROJECT_SOURCE_DIR})
+endif()
 install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
 
 if(TARGET lapservo_shared)

@@ -39,7 +39,8 @@ NOT_RUN = {
     "rosbag record": "is ROS's own; swing.bag is what `lapservo record` wrote in the line before",
     "ssh ": "another computer",
     "docker ": "needs Docker's daemon",
-    "cd ros2_ws && colcon ": "needs ROS 2; the test ros2.lapservo_msgs builds the package",
+    "cd ros2_ws && colcon ": "needs ROS 2; the test ros2.lapservo_msgs builds the package, ./dev colcon both",
+    "ros2 launch ": "is ROS 2's; the test packaging.ros2 reads the files",
 }
 
 #: Files that pages show, by how their paths begin, and the test that runs them or reads them.
