@@ -12,6 +12,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -25,6 +26,7 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/control/paper_trajectory.h"
+#include "lapservo/crtk/dvrk_frames.h"
 #include "lapservo/crtk/joint_map.h"
 #include "lapservo/kinematics/centre_line.h"
 #include "lapservo/rig/rig_writer.h"
@@ -375,6 +377,26 @@ TEST_P(WireLoop, TwoProcessesConverge) {
   expect_steady();
 }
 
+TEST_P(WireLoop, TrackPublishesFrames) {
+  const auto room = arm();
+  listen();
+  Process track(fmt::format("track {}:/endoscope/image_raw --rig {} --out {} --publish {} --tf-frames c,r,NAME_m,s",
+                            GetParam(), file("rig.yaml"), file("seen.csv"), GetParam()),
+                file("track.txt"));
+  const std::string msg = GetParam() == "ros2" ? "/msg/" : "/";
+  const std::map<std::string, std::string> expected{
+      {"/tf", "tf2_msgs" + msg + "TFMessage"},
+      {"/tf_static", "tf2_msgs" + msg + "TFMessage"},
+      {"/lapservo/PSM1/pose", "geometry_msgs" + msg + "PoseWithCovarianceStamped"},
+      {"/lapservo/PSM1/markers", "visualization_msgs" + msg + "MarkerArray"}};
+  for (const auto& [topic, type] : expected) {
+    wait_for([&, name = topic] { return ears_->published().contains(name); });
+    EXPECT_EQ(ears_->published()[topic], type) << said("track.txt");
+  }
+  track.signal(SIGINT);
+  EXPECT_EQ(track.wait(), 0) << said("track.txt");
+}
+
 TEST_P(FirstWireLoop, ObservesOnlyWithoutEnableMotion) {
   const Arm room(GetParam(), rig_);
   listen();
@@ -467,6 +489,27 @@ TEST_P(FirstWireLoop, RecordsAnArmThatItMovesAndCalibratesFromIt) {
   EXPECT_NEAR(measured.joints->offset[1], default_joints().offset[1] - joint_error_rad, 4e-3);
   const Rigid3 moved = rig_.instruments[0].camera_from_rcm->inverse() * *measured.camera_from_rcm;
   EXPECT_LT(moved.translation.norm(), 0.5e-3) << said("tool.txt");
+
+  // The same for dVRK: published for a resting endoscope, and as a file for one that an ECM holds.
+  std::optional<PlaceMessage> base_frame;
+  std::mutex mutex;
+  const auto subscription = ears_->subscribe_places("/PSM1/set_base_frame", [&](PlaceMessage&& message) {
+    const std::lock_guard lock(mutex);
+    base_frame = message;
+  });
+  const std::string calibrate = fmt::format("calibrate registration {} --rig {} --out {} --base-frame {} ",
+                                            file("swing"), file("new.yaml"), file("again.yaml"), file("base.json"));
+  expect_ends(calibrate + "--set-base-frame " + GetParam() + ":PSM1", 0, "published on /PSM1/set_base_frame");
+  const std::lock_guard lock(mutex);
+  ASSERT_TRUE(base_frame);
+  const Rigid3 dvrk_from_rcm = dvrk_from_camera() * *load_rig(file("again.yaml")).instruments[0].camera_from_rcm;
+  EXPECT_LT((base_frame->pose.translation - dvrk_from_rcm.translation).norm(), 1e-9);
+  EXPECT_NE(said("base.json").find("\"base_frame\""), std::string::npos) << said("base.json");
+  const auto ecm = ears_->place_publisher("/ECM/local/measured_cp");
+  Process held(calibrate + "--endoscope " + GetParam() + ":ECM", file("held.txt"));
+  wait_for([&] { return ecm({now_s(), "ECM_base", {}}), said("base.json").find("\"name\"") != std::string::npos; });
+  EXPECT_EQ(held.wait(), 0) << said("held.txt");
+  EXPECT_NE(said("base.json").find("\"name\": \"PSM1\""), std::string::npos) << said("base.json");
 
   // Interrupted on its way it brakes, and keeps what it has.
   Process interrupted(moving("part"), file("interrupted.txt"));

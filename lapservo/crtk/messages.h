@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "lapservo/geometry/rigid3.h"
+
 namespace lapservo::internal {
 
 // Messages of a CRTK site, independent of the transport. Times are the sender's stamps in seconds; NaN for an invalid
@@ -101,6 +103,39 @@ struct PoseMessage {
   std::array<double, 3> position_m{};
   std::array<double, 4> quaternion_xyzw{0, 0, 0, 1};
   std::array<double, 36> covariance{};  ///< row by row
+};
+
+/// geometry_msgs/PoseStamped: measured_cp, set_base_frame.
+struct PlaceMessage {
+  double stamp_s = 0;
+  std::string frame;         ///< written, not read
+  Rigid3 pose;               ///< frame_from_body
+  std::uint64_t source = 0;  ///< as in JointMessage
+};
+
+/// tf2_msgs/TFMessage: /tf.
+struct TransformsMessage {
+  struct Transform {
+    std::string frame, child;
+    Rigid3 frame_from_child;
+  };
+  double stamp_s = 0;
+  std::vector<Transform> transforms;
+};
+/// /tf_static: the last one reaches subscribers that come later.
+struct StaticTransformsMessage : TransformsMessage {};
+
+/// visualization_msgs/MarkerArray of cylinders, which viewers forget 0.5 s later.
+struct CylindersMessage {
+  struct Cylinder {
+    Rigid3 frame_from_centre;  ///< z along the axis
+    double diameter_m = 0, length_m = 0;
+    std::array<float, 4> rgba{};  ///< 0 to 1
+  };
+  static constexpr double lifetime_s = 0.5;
+  double stamp_s = 0;
+  std::string frame, name;  ///< the name by which viewers keep them apart from others
+  std::vector<Cylinder> cylinders;
 };
 
 /// diagnostic_msgs/DiagnosticArray of one status.

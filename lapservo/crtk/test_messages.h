@@ -29,6 +29,7 @@ struct Fields {
   static auto of(const ImageMessage& m) {
     return std::tie(m.width, m.height, m.step, m.encoding, m.is_bigendian, m.data);
   }
+  static auto of(const PlaceMessage& m) { return std::tie(m.pose); }
   static auto of(const CompressedImageMessage& m) { return std::tie(m.format, m.data); }
 };
 
@@ -48,6 +49,7 @@ const StringMessage sample_string{sample_stamp_s, "enable"};
 const JoyMessage sample_joy{sample_stamp_s, {1, 0, -3}};
 const TrajectoryMessage sample_trajectory{sample_stamp_s, {"s_rad"}, {{0, {1}}, {2.25, {3, 4}}}};
 const ImageMessage sample_image{sample_stamp_s, 2, 1, 6, "bgr8", true, {1, 2, 3, 4, 5, 6}};
+const PlaceMessage sample_place{sample_stamp_s, "Cart", {Eigen::Quaterniond(0.5, -0.5, 0.5, 0.5), {1, -2, 3}}};
 const CompressedImageMessage sample_jpeg{sample_stamp_s, "jpeg", {7, 8}};
 
 /// Messages that `from` sends on the topic `in` + KIND arrive at `to` on `out` + KIND, with their sender, for each kind
@@ -73,6 +75,7 @@ inline void expect_carries_each_kind(Transport& from, const std::string& in, Tra
   carry("bool", &Transport::bool_publisher, &Transport::subscribe_buttons, BoolMessage{true});
   carry("trajectory", &Transport::trajectory_publisher, &Transport::subscribe_trajectories, sample_trajectory);
   carry("compressed", &Transport::compressed_image_publisher, &Transport::subscribe_compressed_images, sample_jpeg);
+  carry("place", &Transport::place_publisher, &Transport::subscribe_places, sample_place);
   ImageMessage large{sample_stamp_s, 640, 360, 1920, "bgr8", true, {}};
   for (unsigned i = 0; i < 1920 * 360; ++i) large.data.push_back(static_cast<std::uint8_t>(i * i));
   carry("image", &Transport::image_publisher, &Transport::subscribe_images, large);

@@ -87,11 +87,12 @@ class TestTransport : public Transport {
   std::set<std::string> readers_{"/arm"};
   std::tuple<Kept<JointMessage>, Kept<OperatingStateMessage>, Kept<StringMessage>, Kept<JoyMessage>, Kept<BoolMessage>,
              Kept<TrajectoryMessage>, Kept<ImageMessage>, Kept<CompressedImageMessage>, Kept<CameraInfoMessage>,
-             Kept<PoseMessage>, Kept<DiagnosticMessage>, Kept<ObservationMessage>>
+             Kept<PoseMessage>, Kept<PlaceMessage>, Kept<TransformsMessage>, Kept<StaticTransformsMessage>,
+             Kept<CylindersMessage>, Kept<DiagnosticMessage>, Kept<ObservationMessage>>
       kept_;
   std::tuple<Handlers<JointMessage>, Handlers<OperatingStateMessage>, Handlers<StringMessage>, Handlers<BoolMessage>,
              Handlers<CommandMessage>, Handlers<TrajectoryMessage>, Handlers<ImageMessage>,
-             Handlers<CompressedImageMessage>>
+             Handlers<CompressedImageMessage>, Handlers<PlaceMessage>>
       handlers_;
 };
 

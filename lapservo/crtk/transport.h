@@ -38,6 +38,10 @@ class Transport {
   auto compressed_image_publisher(const std::string& topic) { return opened<CompressedImageMessage>(topic); }
   auto camera_info_publisher(const std::string& topic) { return opened<CameraInfoMessage>(topic); }
   auto pose_publisher(const std::string& topic) { return opened<PoseMessage>(topic); }
+  auto place_publisher(const std::string& topic) { return opened<PlaceMessage>(topic); }
+  auto transform_publisher(const std::string& topic) { return opened<TransformsMessage>(topic); }
+  auto static_transform_publisher(const std::string& topic) { return opened<StaticTransformsMessage>(topic); }
+  auto cylinder_publisher(const std::string& topic) { return opened<CylindersMessage>(topic); }
   auto diagnostic_publisher(const std::string& topic) { return opened<DiagnosticMessage>(topic); }
   auto observation_publisher(const std::string& topic) { return opened<ObservationMessage>(topic); }
   /// For servo_jp: only the newest setpoint is kept, for 50 ms, and none reaches a subscriber that came after it.
@@ -58,6 +62,7 @@ class Transport {
   Subscription subscribe_compressed_images(const std::string& topic, Handler<CompressedImageMessage> take) {
     return listen(topic, take);
   }
+  Subscription subscribe_places(const std::string& topic, Handler<PlaceMessage> take) { return listen(topic, take); }
   virtual Subscription subscribe_commands(const std::string& topic, CommandType type,
                                           Handler<CommandMessage> handler) = 0;
 
@@ -76,10 +81,15 @@ class Transport {
       std::variant<Publisher<JointMessage>, Publisher<OperatingStateMessage>, Publisher<StringMessage>,
                    Publisher<JoyMessage>, Publisher<BoolMessage>, Publisher<TrajectoryMessage>, Publisher<ImageMessage>,
                    Publisher<CompressedImageMessage>, Publisher<CameraInfoMessage>, Publisher<PoseMessage>,
-                   Publisher<DiagnosticMessage>, Publisher<ObservationMessage>>;
-  using AnyHandler =
-      std::variant<Handler<JointMessage>, Handler<OperatingStateMessage>, Handler<StringMessage>, Handler<BoolMessage>,
-                   Handler<TrajectoryMessage>, Handler<ImageMessage>, Handler<CompressedImageMessage>>;
+                   Publisher<PlaceMessage>, Publisher<TransformsMessage>, Publisher<StaticTransformsMessage>,
+                   Publisher<CylindersMessage>, Publisher<DiagnosticMessage>, Publisher<ObservationMessage>>;
+  using AnyHandler = std::variant<Handler<JointMessage>, Handler<OperatingStateMessage>, Handler<StringMessage>,
+                                  Handler<BoolMessage>, Handler<TrajectoryMessage>, Handler<ImageMessage>,
+                                  Handler<CompressedImageMessage>, Handler<PlaceMessage>>;
+  /// Whether the last message reaches subscribers that come later.
+  template <typename Message>
+  static constexpr bool is_latched =
+      std::is_same_v<Message, OperatingStateMessage> || std::is_same_v<Message, StaticTransformsMessage>;
   template <typename Message>
   static constexpr bool is_image =
       std::is_same_v<Message, ImageMessage> || std::is_same_v<Message, CompressedImageMessage>;

@@ -14,6 +14,7 @@
 #include "lapservo/core/printable.h"
 #include "lapservo/io/overlay.h"
 #include "lapservo/io/pictures/jpeg_encoding.h"
+#include "lapservo/rig/single_instrument.h"
 #include "lapservo/robot/steady_clock.h"
 
 namespace lapservo::internal {
@@ -51,10 +52,6 @@ std::string topic(const Rig& rig, const std::string& name) {
   return "/lapservo/" + rig.instruments.front().name + "/" + name;
 }
 
-Rigid3 camera_from_marker_at(const Instrument& instrument, const JointVector& q) {
-  return camera_from_marker(instrument.marker, *instrument.camera_from_rcm * rcm_from_unrolled(q), q.psi_rad);
-}
-
 // Nothing for what makes no sense, and for one of more than an hour or ten thousand points, which takes too long to
 // check.
 std::optional<Trajectory> trajectory_of(const TrajectoryMessage& message) {
@@ -79,30 +76,11 @@ std::optional<Trajectory> trajectory_of(const TrajectoryMessage& message) {
 
 }  // namespace
 
-PoseMessage pose_message(const Instrument& instrument, const Observation::Rcm& seen) {
-  const Rigid3 pose = camera_from_marker_at(instrument, seen.q);
-  Eigen::Matrix<double, 6, 4> jacobian;
-  constexpr double step = 1e-6;
-  for (int i = 0; i < 4; ++i) {
-    const Rigid3 moved =
-        camera_from_marker_at(instrument, JointVector::from_vector(seen.q.vector() + step * Eigen::Vector4d::Unit(i)));
-    const Eigen::AngleAxisd turn(moved.rotation * pose.rotation.conjugate());
-    jacobian.col(i) << (moved.translation - pose.translation) / step, turn.axis() * (turn.angle() / step);
-  }
-  PoseMessage message;
-  message.position_m = {pose.translation.x(), pose.translation.y(), pose.translation.z()};
-  message.quaternion_xyzw = {pose.rotation.x(), pose.rotation.y(), pose.rotation.z(), pose.rotation.w()};
-  const Eigen::Matrix<double, 6, 6> covariance = jacobian * seen.covariance * jacobian.transpose();
-  message.covariance = rows_of<36>(covariance);
-  return message;
-}
-
-LoopTopics::LoopTopics(Transport& transport, const Rig& rig, const std::string& camera_frame, bool hears)
+LoopTopics::LoopTopics(Transport& transport, const Rig& rig, const FrameNames& frames, bool hears)
     : transport_(transport),
       rig_(rig),
-      frame_(camera_frame),
       observation_(transport.observation_publisher(topic(rig, "observation"))),
-      pose_(transport.pose_publisher(topic(rig, "pose"))),
+      frames_(transport, first_instrument(rig, "rig"), frames),
       desired_(transport.joint_publisher(topic(rig, "desired"))),
       error_(transport.joint_publisher(topic(rig, "error"))),
       diagnostics_(transport.diagnostic_publisher("/diagnostics")),
@@ -158,7 +136,7 @@ void LoopTopics::publish_observation(const ControlTick& tick, double stamp_s) {
   const bool current = measured.registration == tick.decision.registration;
   ObservationMessage message;
   message.stamp_s = stamp_s;
-  message.frame = frame_;
+  message.frame = frames_.camera();
   message.instrument = instrument.name;
   message.status = to_string(seen.status);
   message.action = to_string(tick.decision.control.action);
@@ -177,11 +155,8 @@ void LoopTopics::publish_observation(const ControlTick& tick, double stamp_s) {
   if (seen.status == Status::ok && seen.rcm && instrument.camera_from_rcm && current) {
     message.q = rows_of<4>(seen.rcm->q.vector());
     message.q_covariance = rows_of<16>(seen.rcm->covariance);
-    PoseMessage pose = pose_message(instrument, *seen.rcm);
-    pose.stamp_s = stamp_s;
-    pose.frame = frame_;
-    pose_(pose);
   }
+  frames_.publish(0, seen, current ? instrument.camera_from_rcm : std::nullopt, stamp_s);
   observation_(message);
 }
 

@@ -14,6 +14,7 @@
 #include "lapservo/control/trajectory.h"
 #include "lapservo/core/bounded_queue.h"
 #include "lapservo/crtk/transport.h"
+#include "lapservo/loop_topics/frame_topics.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/servo/run.h"
 
@@ -34,17 +35,16 @@ struct LoopWishes {
 };
 
 /// The loop's topics for those who watch and command it, of the rig's first instrument NAME:
-/// /lapservo/NAME/observation (lapservo_msgs/Observation) and /lapservo/NAME/pose (camera_from_marker, where
-/// camera_from_rcm is known) of every image; /lapservo/NAME/desired and /lapservo/NAME/error (JointState: s_rad, r_px,
-/// l_px, d_px) every tick; /diagnostics (DiagnosticArray) once a second and when something changes;
-/// /lapservo/NAME/overlay/compressed, drawn in a thread of its own, at most ten a second. It hears
-/// /lapservo/NAME/command (StringStamped: start, start force; any other word stops), /lapservo/NAME/set_point
+/// /lapservo/NAME/observation (lapservo_msgs/Observation) and FrameTopics of every image; /lapservo/NAME/desired and
+/// /lapservo/NAME/error (JointState: s_rad, r_px, l_px, d_px) every tick; /diagnostics (DiagnosticArray) once a second
+/// and when something changes; /lapservo/NAME/overlay/compressed, drawn in a thread of its own, at most ten a second.
+/// It hears /lapservo/NAME/command (StringStamped: start, start force; any other word stops), /lapservo/NAME/set_point
 /// (JointState: s_rad, r_px, l_px, d_px) and /lapservo/NAME/trajectory (JointTrajectory of these). A start that is
 /// repeated counts once: it would start the arm by itself after each hold.
 class LoopTopics {
  public:
   /// `hears`: whether it hears anything; else it only publishes.
-  LoopTopics(Transport& transport, const Rig& rig, const std::string& camera_frame, bool hears = true);
+  LoopTopics(Transport& transport, const Rig& rig, const FrameNames& frames, bool hears = true);
   ~LoopTopics();
 
   /// `state`: the loop's, in words; empty where it tracks.
@@ -74,10 +74,10 @@ class LoopTopics {
 
   Transport& transport_;
   Rig rig_;
-  std::string frame_, last_state_;
+  std::string last_state_;
   double next_state_s_ = 0;
   Transport::Publisher<ObservationMessage> observation_;
-  Transport::Publisher<PoseMessage> pose_;
+  FrameTopics frames_;
   Transport::Publisher<JointMessage> desired_, error_;
   Transport::Publisher<DiagnosticMessage> diagnostics_;
   Transport::Publisher<CompressedImageMessage> overlay_;
@@ -92,8 +92,5 @@ class LoopTopics {
   std::vector<Transport::Subscription> subscriptions_;
   std::thread thread_;  // last: it uses the others
 };
-
-/// camera_from_marker of a configuration with its covariance from that of theta, phi, rho, psi.
-PoseMessage pose_message(const Instrument& instrument, const Observation::Rcm& seen);
 
 }  // namespace lapservo::internal

@@ -94,6 +94,11 @@ void read_fields(Bytes& from, OperatingStateMessage& message) {
   message.is_busy = from.number<std::uint8_t>() != 0;
 }
 
+void read_fields(Bytes& from, PlaceMessage& message) {
+  for (double& value : message.pose.translation) value = from.number<double>();
+  for (double& value : message.pose.rotation.coeffs()) value = from.number<double>();  // x, y, z, w
+}
+
 void read_fields(Bytes& from, StringMessage& message) {
   message.text = from.text();
 }
@@ -122,6 +127,7 @@ template std::optional<OperatingStateMessage> decode_ros1(std::span<const std::u
 template std::optional<JoyMessage> decode_ros1(std::span<const std::uint8_t>);
 template std::optional<StringMessage> decode_ros1(std::span<const std::uint8_t>);
 template std::optional<ImageMessage> decode_ros1(std::span<const std::uint8_t>);
+template std::optional<PlaceMessage> decode_ros1(std::span<const std::uint8_t>);
 template std::optional<CompressedImageMessage> decode_ros1(std::span<const std::uint8_t>);
 
 }  // namespace lapservo::internal

@@ -95,6 +95,31 @@ TEST(Ros1Messages, TellOfTheLoop) {
   EXPECT_EQ(pose_wire.pose.pose.orientation.w, 0.8);
   EXPECT_EQ(pose_wire.pose.covariance[7], 5);
 
+  const Rigid3 place{Eigen::Quaterniond(0.8, 0, 0.6, 0), {1, 2, 3}};
+  const auto place_wire = ros1_message(PlaceMessage{stamp_s, "camera", place});
+  EXPECT_EQ(place_wire.header.frame_id, "camera");
+  EXPECT_EQ(place_wire.pose.position.z, 3);
+  EXPECT_EQ(place_wire.pose.orientation.y, 0.6);
+  const auto frames_wire = ros1_message(TransformsMessage{stamp_s, {{"a", "b", {}}, {"c", "d", place}}});
+  ASSERT_EQ(frames_wire.transforms.size(), 2u);
+  EXPECT_EQ(frames_wire.transforms[1].header.stamp.sec, 1700000000u);
+  EXPECT_EQ(frames_wire.transforms[1].header.frame_id, "c");
+  EXPECT_EQ(frames_wire.transforms[1].child_frame_id, "d");
+  EXPECT_EQ(frames_wire.transforms[1].transform.rotation.w, 0.8);
+  const auto band_wire =
+      ros1_message(CylindersMessage{stamp_s, "endoscope", "PSM1", {{}, {place, 0.5, 0.25, {1, 0.5, 0.25, 0.125}}}});
+  const auto& band = band_wire.markers.at(1);
+  EXPECT_EQ(band.ns, "PSM1");
+  EXPECT_EQ(band.id, 1);
+  EXPECT_EQ(band.type, 3);
+  EXPECT_EQ(band.scale.x, 0.5);
+  EXPECT_EQ(band.scale.z, 0.25);
+  EXPECT_EQ(band.color.a, 0.125f);
+  EXPECT_EQ(band.lifetime.toSec(), 0.5);
+  // ros/common_msgs' and ros/geometry2's own.
+  EXPECT_STREQ(ros::message_traits::md5sum<ros1::MarkerArray>(), "d155b9ce5188fbaf89745847fd5882d7");
+  EXPECT_STREQ(ros::message_traits::md5sum<ros1::TFMessage>(), "94810edda583a504dfda3829e70d7eec");
+
   const DiagnosticMessage state{
       stamp_s, DiagnosticMessage::Level::warning, "lapservo", "hold", {{"reason", "outlier"}}};
   const auto state_wire = ros1_message(state);

@@ -21,6 +21,15 @@ Type with_stamp(double stamp_s) {
   return wire;
 }
 
+template <typename Quaternion>
+void set(Quaternion& to, const Eigen::Quaterniond& q) {
+  to.x = q.x(), to.y = q.y(), to.z = q.z(), to.w = q.w();
+}
+template <typename Vector>
+void set(Vector& to, const Eigen::Vector3d& v) {
+  to.x = v.x(), to.y = v.y(), to.z = v.z();
+}
+
 }  // namespace
 
 ros1::JointState ros1_message(const JointMessage& message) {
@@ -107,6 +116,45 @@ ros1::PoseWithCovarianceStamped ros1_message(const PoseMessage& message) {
   const auto& q = message.quaternion_xyzw;
   turn.x = q[0], turn.y = q[1], turn.z = q[2], turn.w = q[3];
   std::copy(message.covariance.begin(), message.covariance.end(), wire.pose.covariance.begin());
+  return wire;
+}
+
+ros1::PoseStamped ros1_message(const PlaceMessage& message) {
+  auto wire = with_stamp<ros1::PoseStamped>(message.stamp_s);
+  wire.header.frame_id = message.frame;
+  set(wire.pose.position, message.pose.translation);
+  set(wire.pose.orientation, message.pose.rotation);
+  return wire;
+}
+
+ros1::TFMessage ros1_message(const TransformsMessage& message) {
+  ros1::TFMessage wire;
+  for (const TransformsMessage::Transform& one : message.transforms) {
+    auto& to = wire.transforms.emplace_back();
+    to.header.stamp = time_of(message.stamp_s);
+    to.header.frame_id = one.frame;
+    to.child_frame_id = one.child;
+    set(to.transform.translation, one.frame_from_child.translation);
+    set(to.transform.rotation, one.frame_from_child.rotation);
+  }
+  return wire;
+}
+
+ros1::MarkerArray ros1_message(const CylindersMessage& message) {
+  ros1::MarkerArray wire;
+  for (const CylindersMessage::Cylinder& one : message.cylinders) {
+    auto& to = wire.markers.emplace_back();
+    to.header.stamp = time_of(message.stamp_s);
+    to.header.frame_id = message.frame;
+    to.ns = message.name;
+    to.id = static_cast<std::int32_t>(wire.markers.size()) - 1;
+    to.type = to.CYLINDER;
+    set(to.pose.position, one.frame_from_centre.translation);
+    set(to.pose.orientation, one.frame_from_centre.rotation);
+    set(to.scale, Eigen::Vector3d(one.diameter_m, one.diameter_m, one.length_m));
+    to.color.r = one.rgba[0], to.color.g = one.rgba[1], to.color.b = one.rgba[2], to.color.a = one.rgba[3];
+    to.lifetime.fromSec(CylindersMessage::lifetime_s);
+  }
   return wire;
 }
 

@@ -4,6 +4,7 @@
 #include <crtk_msgs/StringStamped.h>
 #include <cstddef>
 #include <diagnostic_msgs/DiagnosticArray.h>
+#include <geometry_msgs/PoseStamped.h>
 #include <geometry_msgs/PoseWithCovarianceStamped.h>
 #include <lapservo_msgs/Observation.h>
 #include <memory>
@@ -13,8 +14,10 @@
 #include <sensor_msgs/JointState.h>
 #include <sensor_msgs/Joy.h>
 #include <std_msgs/Bool.h>
+#include <tf2_msgs/TFMessage.h>
 #include <trajectory_msgs/JointTrajectory.h>
 #include <type_traits>
+#include <visualization_msgs/MarkerArray.h>
 
 #include "lapservo/crtk/messages.h"
 
@@ -40,6 +43,9 @@ using Image = sensor_msgs::Image_<Ros1Allocator<std::byte>>;
 using CompressedImage = sensor_msgs::CompressedImage_<Ros1Allocator<std::byte>>;
 using CameraInfo = sensor_msgs::CameraInfo_<Ros1Allocator<std::byte>>;
 using PoseWithCovarianceStamped = geometry_msgs::PoseWithCovarianceStamped_<Ros1Allocator<std::byte>>;
+using PoseStamped = geometry_msgs::PoseStamped_<Ros1Allocator<std::byte>>;
+using TFMessage = tf2_msgs::TFMessage_<Ros1Allocator<std::byte>>;
+using MarkerArray = visualization_msgs::MarkerArray_<Ros1Allocator<std::byte>>;
 using DiagnosticArray = diagnostic_msgs::DiagnosticArray_<Ros1Allocator<std::byte>>;
 using Observation = lapservo_msgs::Observation_<Ros1Allocator<std::byte>>;
 }  // namespace ros1
@@ -55,6 +61,9 @@ ros1::Image ros1_message(const ImageMessage& message);
 ros1::CompressedImage ros1_message(const CompressedImageMessage& message);
 ros1::CameraInfo ros1_message(const CameraInfoMessage& message);
 ros1::PoseWithCovarianceStamped ros1_message(const PoseMessage& message);
+ros1::PoseStamped ros1_message(const PlaceMessage& message);
+ros1::TFMessage ros1_message(const TransformsMessage& message);
+ros1::MarkerArray ros1_message(const CylindersMessage& message);
 ros1::DiagnosticArray ros1_message(const DiagnosticMessage& message);
 ros1::Observation ros1_message(const ObservationMessage& message);
 

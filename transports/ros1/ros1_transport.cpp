@@ -128,8 +128,7 @@ double Ros1Transport::stamp_now_s() const {
 
 void Ros1Transport::open(const std::string& topic, AnyPublisher& made) {
   const auto make = [&]<typename Message>(Publisher<Message>& one) {
-    constexpr bool latched = std::is_same_v<Message, OperatingStateMessage>;
-    one = publisher<Message>(node_, readers_, topic, is_image<Message> ? newest : few, latched);
+    one = publisher<Message>(node_, readers_, topic, is_image<Message> ? newest : few, is_latched<Message>);
   };
   std::visit(make, made);
 }

@@ -81,6 +81,7 @@ int main(int argc, char** argv) {
   echo("trajectory", &Transport::trajectory_publisher, &Transport::subscribe_trajectories);
   echo("image", &Transport::image_publisher, &Transport::subscribe_images);
   echo("compressed", &Transport::compressed_image_publisher, &Transport::subscribe_compressed_images);
+  echo("place", &Transport::place_publisher, &Transport::subscribe_places);
   const auto state = transport.operating_state_publisher("/out/state");
   state({1700000000, "DISABLED", false, false});  // before anybody listens: it is latched
   subscriptions.push_back(

@@ -127,8 +127,7 @@ double Ros2Transport::stamp_now_s() const {
 
 void Ros2Transport::open(const std::string& topic, AnyPublisher& publisher) {
   const auto make = [&]<typename Message>(Publisher<Message>& one) {
-    constexpr bool latched = std::is_same_v<Message, OperatingStateMessage>;
-    one = implementation_->publisher<Message>(topic, latched             ? Delivery::latched
+    one = implementation_->publisher<Message>(topic, is_latched<Message> ? Delivery::latched
                                                      : is_image<Message> ? Delivery::best_effort
                                                                          : Delivery::reliable);
   };

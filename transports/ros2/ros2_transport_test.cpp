@@ -272,6 +272,9 @@ TEST(Ros2Transport, WhatItTellsOfTheLoopArrivesAsItsType) {
     });
   };
   EXPECT_TRUE(arrives("/pose", from.pose_publisher("/pose")));
+  EXPECT_TRUE(arrives("/tf", from.transform_publisher("/tf")));
+  EXPECT_TRUE(arrives("/tf_static", from.static_transform_publisher("/tf_static")));
+  EXPECT_TRUE(arrives("/markers", from.cylinder_publisher("/markers")));
   EXPECT_TRUE(arrives("/diagnostics", from.diagnostic_publisher("/diagnostics")));
   EXPECT_TRUE(arrives("/seen", from.observation_publisher("/seen")));
   EXPECT_TRUE(arrives("/camera_info", from.camera_info_publisher("/camera_info")));

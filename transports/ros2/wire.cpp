@@ -39,6 +39,14 @@ Type with_header(double stamp_s) {
   return wire;
 }
 
+geometry_msgs_msg_dds__Quaternion_ quaternion_of(const Eigen::Quaterniond& q) {
+  return {q.x(), q.y(), q.z(), q.w()};
+}
+geometry_msgs_msg_dds__Pose_ pose_of(const Rigid3& pose) {
+  const Eigen::Vector3d& at = pose.translation;
+  return {{at.x(), at.y(), at.z()}, quaternion_of(pose.rotation)};
+}
+
 template <typename Time>
 double seconds_of(const Time& time) {
   if (time.nanosec_ >= 1000000000u) return std::numeric_limits<double>::quiet_NaN();
@@ -201,6 +209,55 @@ void Wire<PoseMessage>::write(dds_entity_t writer, const PoseMessage& message) {
   const auto& q = message.quaternion_xyzw;
   wire.pose_.pose_.orientation_ = {q[0], q[1], q[2], q[3]};
   std::copy(message.covariance.begin(), message.covariance.end(), wire.pose_.covariance_);
+  dds_write(writer, &wire);
+}
+
+void Wire<PlaceMessage>::write(dds_entity_t writer, const PlaceMessage& message) {
+  auto wire = with_header<Type>(message.stamp_s);
+  wire.header_.frame_id_ = pointer(message.frame);
+  wire.pose_ = pose_of(message.pose);
+  dds_write(writer, &wire);
+}
+
+PlaceMessage Wire<PlaceMessage>::read(const Type& wire) {
+  const auto& at = wire.pose_.position_;
+  const auto& turn = wire.pose_.orientation_;
+  return {stamp_of(wire.header_), {}, {Eigen::Quaterniond(turn.w_, turn.x_, turn.y_, turn.z_), {at.x_, at.y_, at.z_}}};
+}
+
+void Wire<TransformsMessage>::write(dds_entity_t writer, const TransformsMessage& message) {
+  std::vector<geometry_msgs_msg_dds__TransformStamped_> transforms;
+  for (const TransformsMessage::Transform& one : message.transforms) {
+    auto& to = transforms.emplace_back(with_header<geometry_msgs_msg_dds__TransformStamped_>(message.stamp_s));
+    to.header_.frame_id_ = pointer(one.frame);
+    to.child_frame_id_ = pointer(one.child);
+    const Eigen::Vector3d& at = one.frame_from_child.translation;
+    to.transform_ = {{at.x(), at.y(), at.z()}, quaternion_of(one.frame_from_child.rotation)};
+  }
+  Type wire{};
+  point(wire.transforms_, transforms);
+  dds_write(writer, &wire);
+}
+
+void Wire<CylindersMessage>::write(dds_entity_t writer, const CylindersMessage& message) {
+  constexpr std::int32_t cylinder = 3;
+  static char none[1] = "";
+  std::vector<visualization_msgs_msg_dds__Marker_> markers;
+  for (const CylindersMessage::Cylinder& one : message.cylinders) {
+    auto& to = markers.emplace_back(with_header<visualization_msgs_msg_dds__Marker_>(message.stamp_s));
+    to.header_.frame_id_ = pointer(message.frame);
+    to.ns_ = pointer(message.name);
+    to.id_ = static_cast<std::int32_t>(markers.size()) - 1;
+    to.type_ = cylinder;
+    to.pose_ = pose_of(one.frame_from_centre);
+    to.scale_ = {one.diameter_m, one.diameter_m, one.length_m};
+    to.color_ = {one.rgba[0], one.rgba[1], one.rgba[2], one.rgba[3]};
+    to.lifetime_ = time_of<builtin_interfaces_msg_dds__Duration_>(CylindersMessage::lifetime_s);
+    to.texture_.header_.frame_id_ = to.texture_.format_ = to.texture_resource_ = none;
+    to.text_ = to.mesh_resource_ = to.mesh_file_.filename_ = none;
+  }
+  Type wire{};
+  point(wire.markers_, markers);
   dds_write(writer, &wire);
 }
 

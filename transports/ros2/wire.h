@@ -90,6 +90,30 @@ struct Wire<PoseMessage> {
 };
 
 template <>
+struct Wire<PlaceMessage> {
+  using Type = geometry_msgs_msg_dds__PoseStamped_;
+  static const dds_topic_descriptor_t& descriptor() { return geometry_msgs_msg_dds__PoseStamped__desc; }
+  static void write(dds_entity_t writer, const PlaceMessage& message);
+  static PlaceMessage read(const Type& wire);
+};
+
+template <>
+struct Wire<TransformsMessage> {
+  using Type = tf2_msgs_msg_dds__TFMessage_;
+  static const dds_topic_descriptor_t& descriptor() { return tf2_msgs_msg_dds__TFMessage__desc; }
+  static void write(dds_entity_t writer, const TransformsMessage& message);
+};
+template <>
+struct Wire<StaticTransformsMessage> : Wire<TransformsMessage> {};
+
+template <>
+struct Wire<CylindersMessage> {
+  using Type = visualization_msgs_msg_dds__MarkerArray_;
+  static const dds_topic_descriptor_t& descriptor() { return visualization_msgs_msg_dds__MarkerArray__desc; }
+  static void write(dds_entity_t writer, const CylindersMessage& message);
+};
+
+template <>
 struct Wire<DiagnosticMessage> {
   using Type = diagnostic_msgs_msg_dds__DiagnosticArray_;
   static const dds_topic_descriptor_t& descriptor() { return diagnostic_msgs_msg_dds__DiagnosticArray__desc; }

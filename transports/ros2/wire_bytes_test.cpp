@@ -65,6 +65,8 @@ class MessageReader {
   void read_value(const std::string& type, const std::string& package, const std::string& name) {
     if (type == "float64") {
       fields_[name] = fmt::format("{}", number<double>());
+    } else if (type == "float32") {
+      fields_[name] = fmt::format("{}", number<float>());
     } else if (type == "int32") {
       fields_[name] = fmt::format("{}", number<std::int32_t>());
     } else if (type == "uint32") {
@@ -177,6 +179,21 @@ TEST(WireBytes, OfWhatTheLoopTells) {
   expect_fields(told,
                 "header.frame_id endoscope, pose.pose.position.z 3, pose.pose.orientation.y 0.6, "
                 "pose.pose.orientation.w 0.8, pose.covariance[34] 0, pose.covariance[35] 5");
+  const Rigid3 place{Eigen::Quaterniond(0.8, 0, 0.6, 0), {1, 2, 3}};
+  const Fields base = sent_as("geometry_msgs/PoseStamped", PlaceMessage{stamp_s, "camera", place});
+  expect_fields(base, stamp);
+  expect_fields(base, "header.frame_id camera, pose.position.z 3, pose.orientation.y 0.6, pose.orientation.w 0.8");
+  expect_fields(sent_as("tf2_msgs/TFMessage", TransformsMessage{stamp_s, {{"a", "b", {}}, {"c", "d", place}}}),
+                "transforms 2 of them, transforms[0].header.stamp.sec 1700000000, transforms[1].header.frame_id c, "
+                "transforms[1].child_frame_id d, transforms[1].transform.translation.z 3, "
+                "transforms[1].transform.rotation.y 0.6, transforms[1].transform.rotation.w 0.8");
+  const CylindersMessage::Cylinder band{place, 0.5, 0.25, {1, 0.5, 0.25, 0.125}};
+  expect_fields(sent_as("visualization_msgs/MarkerArray", CylindersMessage{stamp_s, "endoscope", "PSM1", {{}, band}}),
+                "markers 2 of them, markers[1].header.frame_id endoscope, markers[1].ns PSM1, markers[1].id 1, "
+                "markers[1].type 3, markers[1].action 0, markers[1].pose.position.z 3, "
+                "markers[1].pose.orientation.w 0.8, markers[1].scale.x 0.5, markers[1].scale.y 0.5, "
+                "markers[1].scale.z 0.25, markers[1].color.r 1, markers[1].color.a 0.125, "
+                "markers[1].lifetime.nanosec 500000000, markers[1].text , markers[1].mesh_file.data 0 of them");
   const DiagnosticMessage state{
       stamp_s, DiagnosticMessage::Level::error, "lapservo", "hold", {{"reason", "outlier"}, {"delay_s", ""}}};
   expect_fields(sent_as("diagnostic_msgs/DiagnosticArray", state),

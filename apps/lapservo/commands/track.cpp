@@ -21,6 +21,7 @@
 #include "apps/lapservo/inputs/frame_input.h"
 #include "apps/lapservo/inputs/input_files.h"
 #include "apps/lapservo/inputs/live_frames.h"
+#include "apps/lapservo/inputs/transports.h"
 #include "lapservo/calibration/check/frame_diagnosis.h"
 #include "lapservo/calibration/check/usual_cause.h"
 #include "lapservo/core/error.h"
@@ -43,7 +44,7 @@ namespace fs = std::filesystem;
 
 struct TrackOptions : FrameOptions {
   std::string input, rig, out = "obs.csv", overlay;
-  std::string method = "surface";
+  std::string method = "surface", publish, tf_frames = default_frames;
   bool single = false;
   WebOptions web;
   bool page_only = false;  ///< `lapservo view`: at the input's own pace, and without --out
@@ -197,6 +198,26 @@ void wait_on_page(WebView& web, const std::function<bool()>& done) {
   while (!interrupted() && !web.wishes().stop && !done()) clock.sleep_until(clock.now_s() + 0.005);
 }
 
+// /tf and the rest of FrameTopics. Begins with the first frame, with which the rig is known.
+class Publishing {
+ public:
+  explicit Publishing(const TrackOptions& options)
+      : frames_(frame_names_of(options.tf_frames)),
+        transport_(make_transport(options.publish, live_node_name, "--publish")) {}
+  void publish(const std::shared_ptr<const Rig>& rig, const std::vector<Observation>& observations, double age_s) {
+    if (rig != rig_) topics_.emplace(*transport_, *rig, frames_);
+    rig_ = rig;
+    for (std::size_t i = 0; i < observations.size(); ++i)
+      topics_->publish(i, observations[i], rig->instruments[i].camera_from_rcm, transport_->stamp_now_s() - age_s);
+  }
+
+ private:
+  FrameNames frames_;
+  std::unique_ptr<Transport> transport_;
+  std::shared_ptr<const Rig> rig_;
+  std::optional<FrameTopics> topics_;  // last: it uses the transport
+};
+
 // One run of either command: where frames come from, and where what was seen in them goes.
 class TrackRun {
  public:
@@ -208,6 +229,7 @@ class TrackRun {
         source_(live_ ? static_cast<FrameSource&>(*live_) : *file_) {
     if (source_.kind() == FrameSource::Kind::image || source_.kind() == FrameSource::Kind::folder)
       rigs_.expect_pictures();
+    if (!options.publish.empty()) publishing_.emplace(options);
     if (options.web.port) web_.emplace(options.web, page_config_of(options, source_));
     if (!options.page_only) csv_.emplace(options.out);
     if (!options.overlay.empty()) overlay_ = open_overlay_writer(options.overlay, source_);
@@ -267,6 +289,7 @@ class TrackRun {
     for (const Observation& observation : observations)
       if (csv_) csv_->add(frame.index, frame.time_s, frame.file.filename().string(), observation);
     if (overlay_) overlay_->add(frame, draw_overlay(frame.bgr, *rigs_.rig(), observations));
+    if (publishing_) publishing_->publish(rigs_.rig(), observations, clock_.now_s() - came_s);
     if (!web_) return true;
     web_->show({frame.bgr, rigs_.rig(), observations, clock_.now_s() - came_s});
     return !web_->wishes().stop;
@@ -311,6 +334,7 @@ class TrackRun {
   std::unique_ptr<LiveFrames> live_;
   std::unique_ptr<FrameSource> file_;
   FrameSource& source_;
+  std::optional<Publishing> publishing_;
   std::optional<WebView> web_;
   std::optional<ObservationCsv> csv_;
   std::unique_ptr<OverlayWriter> overlay_;
@@ -364,6 +388,11 @@ void add_track(Command app, Run& run_later) {
       "--overlay", options->overlay,
       "Write images (a folder) or a video (.mp4) with the detection drawn in, replacing those of the same name");
   add_web_options(command, options->web);
+  command
+      .add_option("--publish", options->publish,
+                  "Publish /tf, poses and markers over this transport, see docs/messages.md#frames")
+      .one_of({"ros2", "ros1"});
+  add_frame_names_option(command, options->tf_frames);
   command.add_option("--frames", options->frames, "End after so many; 0: all, a camera's until Ctrl-C")
       .whole_number_between(0, 1000000000);
   command.footer("Example:\n  lapservo track video.mp4 --rig rig.yaml --out obs.csv --overlay overlay.mp4");

@@ -10,7 +10,7 @@ namespace lapservo::app {
 LiveFrames::LiveFrames(const std::string& text, const Camera& camera)
     : LiveSource(interrupted),
       text_(text),
-      transports_("lapservo_track"),
+      transports_(live_node_name),
       images_(text, "input", camera, clock_, transports_) {}
 
 std::optional<StampedImage> LiveFrames::take() {

@@ -8,6 +8,9 @@
 
 namespace lapservo::app {
 
+/// The node's name, in all of the command that reads them.
+constexpr auto live_node_name = "lapservo_track";
+
 /// A topic's images as frames to be measured: the newest each time, until Ctrl-C.
 class LiveFrames : public internal::LiveSource {
  public:

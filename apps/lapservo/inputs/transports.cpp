@@ -1,6 +1,11 @@
 #include "apps/lapservo/inputs/transports.h"
 
+#include <set>
+#include <sstream>
+#include <vector>
+
 #include "lapservo/core/error.h"
+#include "lapservo/core/printable.h"
 #ifdef LAPSERVO_ROS1
 #include "transports/ros1/ros1_names.h"
 #include "transports/ros1/ros1_transport.h"
@@ -56,6 +61,24 @@ std::unique_ptr<Transport> make_transport(const std::string& transport, [[maybe_
 #endif
   }
   throw InputError(option, "is " + transport + ", expected ros2 or ros1");
+}
+
+void add_frame_names_option(Command command, std::string& frames) {
+  command.add_option("--tf-frames", frames,
+                     "Names in /tf of the frames of camera, RCM, marker and shaft; NAME stands for the instrument's");
+}
+
+FrameNames frame_names_of(const std::string& frames) {
+  std::istringstream text(frames + ",");
+  std::vector<std::string> names;
+  for (std::string name; std::getline(text, name, ',');) names.push_back(name);
+  const std::set<std::string> distinct(names.begin(), names.end());
+  if (names.size() != 4 || distinct.size() != 4 || distinct.contains("") ||
+      frames.find_first_of(" /\t\n") != std::string::npos)
+    throw InputError(
+        "--tf-frames",
+        "is " + printable(frames) + ", expected four names: camera, RCM, marker, shaft, without blanks and slashes");
+  return {names[0], names[1], names[2], names[3]};
 }
 
 void add_setpoint_readers_option(Command command, int& setpoint_readers) {

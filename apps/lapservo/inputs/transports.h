@@ -5,6 +5,7 @@
 
 #include "apps/lapservo/cli/command.h"
 #include "lapservo/crtk/transport.h"
+#include "lapservo/loop_topics/frame_topics.h"
 
 namespace lapservo::app {
 
@@ -21,6 +22,12 @@ Address address_of(const std::string& text, const std::string& option);
 /// Throws InputError for one that is unknown or that this build lacks.
 std::unique_ptr<internal::Transport> make_transport(const std::string& transport, const std::string& node_name,
                                                     const std::string& option);
+
+constexpr auto default_frames = "endoscope,NAME_rcm,NAME_marker,NAME_shaft";
+/// --tf-frames of the commands that publish frames.
+void add_frame_names_option(Command command, std::string& frames);
+/// Throws InputError for what are not four names.
+internal::FrameNames frame_names_of(const std::string& frames);
 
 /// --setpoint-readers of the commands that move an arm.
 void add_setpoint_readers_option(Command command, int& setpoint_readers);

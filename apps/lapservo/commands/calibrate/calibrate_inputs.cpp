@@ -52,9 +52,10 @@ void refuse_outputs_over_inputs(const CalibrateOptions& options, const Rig& rig)
   std::error_code error;
   for (const std::string& input : {options.input, options.joints})
     if (fs::is_directory(input, error)) inputs.add_pictures_in(input);
-  for (const std::string& out : {options.out, options.report}) inputs.refuse_as_output(out);
+  for (const std::string& out : {options.out, options.report, options.dvrk.base_frame}) inputs.refuse_as_output(out);
   inputs.add_rig(options.rig, rig);
   inputs.refuse_as_output(options.report);
+  inputs.refuse_as_output(options.dvrk.base_frame);
 }
 
 void say_complaint(const std::string& input, const std::string& complaint) {

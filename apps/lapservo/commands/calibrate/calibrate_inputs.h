@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "apps/lapservo/cli/subcommands.h"
+#include "apps/lapservo/commands/calibrate/dvrk_output.h"
 #include "apps/lapservo/inputs/frame_input.h"
 #include "lapservo/calibration/recording/frame_recording.h"
 #include "lapservo/rig/rig.h"
@@ -13,6 +14,7 @@ namespace lapservo::app {
 /// Options of the subcommands that measure one instrument of a rig from frames.
 struct CalibrateOptions : FrameOptions {
   std::string input, rig, out, instrument, joints, report, joint_topic;
+  DvrkOptions dvrk;  ///< of registration only
 };
 
 /// All but the input and the joints, which each subcommand describes itself.

@@ -81,6 +81,7 @@ int calibrate_registration(const CalibrateOptions& options) {
   if (joints) instrument.joints = joints->joints;
   AtomicFile out(options.out);
   watch_for_interrupts();
+  DvrkOutput dvrk(options.dvrk, joints.has_value());
 
   const MeasuredPoses poses =
       frames ? poses_in_frames(rig, index, {*frames, options.input, options.deinterlace}, watched_job())
@@ -100,6 +101,7 @@ int calibrate_registration(const CalibrateOptions& options) {
   out.stream() << rig_yaml(rig, options.out);
   out.commit();
   std::printf("rig: %s\n", options.out.c_str());
+  if (registration.arm) dvrk.write(rig.instruments[index], registration.arm->ranges, options.out);
   return 0;
 }
 
@@ -118,6 +120,7 @@ void add_calibrate_registration(Command parent, Run& run_later) {
       command, *options,
       "CSV of the arm's joints meanwhile (time_s and a column a joint, named as in the rig's joints), or a bag; "
       "without it those in the input, where it is a bag. Without any only the RCM's position can be determined");
+  add_dvrk_options(command, options->dvrk);
   command.footer(
       "Swing the instrument by 0.5 rad in both directions, insert and withdraw it by 20 mm, turn it by 2 rad, all of "
       "it\n"

@@ -182,6 +182,7 @@ void add_arm_options(Command command, ServoOptions& options) {
       "--joint-limits", options.joint_limits,
       "YAML of the arm's joints, for example configs/joint_limits/psm-classic.yaml; with --enable-motion needed");
   add_setpoint_readers_option(command, options.setpoint_readers);
+  add_frame_names_option(command, options.frames);
 }
 
 void add_trajectory_options(Command command, ServoOptions& options) {

@@ -222,6 +222,7 @@ void say_counts(const InterlockCounts& arm, const ImageCounts& images) {
 
 int steer_arm(const ServoOptions& options) {
   const Address address = address_of(options.robot, "--robot");
+  const FrameNames frames = frame_names_of(options.frames);
   if (options.enable_motion) require_joint_limits("--enable-motion", options.joint_limits);
   RunConfig config = run_config_of(options);
   const Rig rig = config.rig;
@@ -248,7 +249,7 @@ int steer_arm(const ServoOptions& options) {
     arm.watch_operator([&] { return operator_presence->was_present(); });
   }
   // Before the arm is heard, so that another loop of this name is.
-  LoopTopics topics(transport, rig, "endoscope", may_command(options, "topics"));
+  LoopTopics topics(transport, rig, frames, may_command(options, "topics"));
   watch_for_interrupts();
   ServoPage* const its_page = page ? &*page : nullptr;
   const std::string missing = wait_for_topics(options, transports, arm, its_page, clock);

@@ -10,6 +10,7 @@
 
 #include "apps/lapservo/cli/web_view.h"
 #include "apps/lapservo/inputs/frame_input.h"
+#include "apps/lapservo/inputs/transports.h"
 #include "lapservo/control/trajectory.h"
 #include "lapservo/servo/run.h"
 
@@ -19,7 +20,7 @@ namespace lapservo::app {
 struct ServoOptions {
   std::string rig, robot, instrument, camera, joint_limits, trajectory = "paper", method = "default", tracker,
                                                             controller, delay = "estimate", out, replay, joint_topic,
-                                                            control = "both", operator_present;
+                                                            control = "both", operator_present, frames = default_frames;
   std::vector<double> set_point, via, start, rcm_px, hide;
   std::vector<double> registration_error;  // 3 x mm
   double latency_ms = 80;
