@@ -15,13 +15,15 @@ namespace {
 
 constexpr int setpoint_priority = 20;
 
-// Topics of CRTK and dVRK that move an arm or change its efforts, in its namespace, by what they carry.
+// Topics of CRTK and dVRK that move an arm or change its efforts, in its namespace, by what they carry. servo_js is
+// that of the dVRK after 2.4.
 const std::map<std::string, CommandType>& motion_commands() {
   using enum CommandType;
   static const std::map<std::string, CommandType> commands{{"servo_jp", joints},
                                                            {"servo_jr", joints},
                                                            {"servo_jv", joints},
                                                            {"servo_jf", joints},
+                                                           {"servo_js", joint_servo},
                                                            {"pid_feed_forward/servo_jf", joints},
                                                            {"move_jp", joints},
                                                            {"move_jr", joints},
@@ -39,6 +41,20 @@ const std::map<std::string, CommandType>& motion_commands() {
                                                            {"hold", nothing},
                                                            {"free", nothing}};
   return commands;
+}
+
+// Those past the arm, which dVRK 2.4 has with `dvrk_system --pid-topics-read-write`, in PID/ beside the arm.
+const std::map<std::string, CommandType>& pid_commands() {
+  using enum CommandType;
+  static const std::map<std::string, CommandType> commands{
+      {"servo_jp", joints}, {"servo_jf", joints}, {"feed_forward/servo_jf", joints}, {"enable", on_or_off}};
+  return commands;
+}
+
+std::string pid_of(const std::string& arm) {
+  const std::size_t slash = arm.rfind('/');
+  const std::size_t name = slash == std::string::npos ? 0 : slash + 1;
+  return arm.substr(0, name) + "PID/" + arm.substr(name);
 }
 
 }  // namespace
@@ -74,13 +90,15 @@ CrtkRobot::CrtkRobot(Transport& transport, const std::string& arm, const Interlo
         const std::lock_guard lock(mutex_);
         interlock_.on_operating_state(message, arrival_s);
       }));
-  if (config.motion_enabled)
-    for (const auto& [name, type] : motion_commands())
-      subscriptions_.push_back(transport.subscribe_commands(topic_of(arm, name), type, [this](CommandMessage&&) {
+  const auto commands = [&](const std::string& of, const std::map<std::string, CommandType>& types) {
+    for (const auto& [name, type] : types)
+      subscriptions_.push_back(transport.subscribe_commands(topic_of(of, name), type, [this](CommandMessage&&) {
         const double arrival_s = clock_.now_s();
         const std::lock_guard lock(mutex_);
         interlock_.on_foreign_command(arrival_s);
       }));
+  };
+  if (config.motion_enabled) commands(arm, motion_commands()), commands(pid_of(arm), pid_commands());
   thread_ = std::thread([this] { command(); });
 }
 

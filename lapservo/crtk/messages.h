@@ -51,10 +51,11 @@ struct StringMessage {
 /// A command of motion, of which only the arrival counts.
 struct CommandMessage {};
 
-/// The content of a CRTK command of motion: joints (sensor_msgs/JointState), a pose (geometry_msgs/PoseStamped, up to
-/// dVRK 2.1 TransformStamped), a twist (TwistStamped), a wrench (WrenchStamped), all three (crtk_msgs/CartesianState),
-/// an impedance (crtk_msgs/CartesianImpedance), a switch (std_msgs/Bool), or nothing (std_msgs/Empty).
-enum class CommandType { joints, pose, twist, wrench, cartesian_state, impedance, on_or_off, nothing };
+/// The content of a CRTK command of motion: joints (sensor_msgs/JointState), the same with modes
+/// (crtk_msgs/JointServo), a pose (geometry_msgs/PoseStamped, up to dVRK 2.1 TransformStamped), a twist (TwistStamped),
+/// a wrench (WrenchStamped), all three (crtk_msgs/CartesianState or CartesianServo), an impedance
+/// (crtk_msgs/CartesianImpedance), a switch (std_msgs/Bool), or nothing (std_msgs/Empty).
+enum class CommandType { joints, joint_servo, pose, twist, wrench, cartesian_state, impedance, on_or_off, nothing };
 
 /// sensor_msgs/Joy: foot pedals. Axes are not used.
 struct JoyMessage {

@@ -29,6 +29,8 @@ std::vector<const dds_topic_descriptor_t*> types_of(CommandType command) {
   switch (command) {
     case CommandType::joints:
       return {&sensor_msgs_msg_dds__JointState__desc};
+    case CommandType::joint_servo:
+      return {&crtk_msgs_msg_dds__JointServo__desc, &sensor_msgs_msg_dds__JointState__desc};
     case CommandType::pose:
       return {&geometry_msgs_msg_dds__PoseStamped__desc, &geometry_msgs_msg_dds__TransformStamped__desc};
     case CommandType::twist:
@@ -36,7 +38,7 @@ std::vector<const dds_topic_descriptor_t*> types_of(CommandType command) {
     case CommandType::wrench:
       return {&geometry_msgs_msg_dds__WrenchStamped__desc};
     case CommandType::cartesian_state:
-      return {&crtk_msgs_msg_dds__CartesianState__desc};
+      return {&crtk_msgs_msg_dds__CartesianState__desc, &crtk_msgs_msg_dds__CartesianServo__desc};
     case CommandType::impedance:
       return {&crtk_msgs_msg_dds__CartesianImpedance__desc};
     case CommandType::on_or_off:

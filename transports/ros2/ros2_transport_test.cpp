@@ -83,6 +83,9 @@ TEST(Ros2Transport, KnowsWhoReads) {
 TEST(Ros2Transport, HearsCommandsOfEachTypeThatDvrkReads) {
   const std::vector<std::pair<CommandType, const dds_topic_descriptor_t*>> commands{
       {CommandType::joints, &sensor_msgs_msg_dds__JointState__desc},
+      {CommandType::joint_servo, &crtk_msgs_msg_dds__JointServo__desc},
+      {CommandType::joint_servo, &sensor_msgs_msg_dds__JointState__desc},
+      {CommandType::cartesian_state, &crtk_msgs_msg_dds__CartesianServo__desc},
       {CommandType::pose, &geometry_msgs_msg_dds__PoseStamped__desc},
       {CommandType::pose, &geometry_msgs_msg_dds__TransformStamped__desc},
       {CommandType::twist, &geometry_msgs_msg_dds__TwistStamped__desc},
