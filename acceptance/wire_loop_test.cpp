@@ -397,6 +397,26 @@ TEST_P(WireLoop, TrackPublishesFrames) {
   EXPECT_EQ(track.wait(), 0) << said("track.txt");
 }
 
+// An arm holds it, and rests; held while its poses don't come.
+TEST_P(WireLoop, GoesOnBesideAnArmThatHoldsTheEndoscope) {
+  listen();
+  std::atomic<bool> tells = true, ended = false;
+  const auto ecm = ears_->place_publisher("/ECM/local/measured_cp");
+  std::thread arm([&] {
+    for (; !ended; sleep(0.01))
+      if (tells) ecm({now_s(), "ECM_base", {Eigen::Quaterniond(0.6, 0, 0.8, 0), {0.1, 0, 0.2}}});
+  });
+  begin("--endoscope " + GetParam() + ":ECM");
+  EXPECT_TRUE(moves());
+  tells = false;
+  expect_soon_said("stale_image");
+  tells = true;
+  EXPECT_TRUE(moves(100, [&] { start(); }));
+  end();
+  ended = true;
+  arm.join();
+}
+
 TEST_P(FirstWireLoop, ObservesOnlyWithoutEnableMotion) {
   const Arm room(GetParam(), rig_);
   listen();

@@ -44,6 +44,7 @@
 #include "lapservo/robot/steady_clock.h"
 #include "lapservo/robot/supervisor.h"
 #include "lapservo/robot/supervisor_state.h"
+#include "lapservo/stream/endoscope_pose.h"
 #include "lapservo/stream/image_stream.h"
 
 // Control: run() follows a Trajectory with a ControllerConfig and passes each ControlTick to a RunObserver.

@@ -1,37 +1,85 @@
 #include "lapservo/crtk/arm_pose.h"
 
+#include <algorithm>
 #include <cmath>
-#include <utility>
 
 #include "lapservo/crtk/crtk_robot.h"
+#include "lapservo/crtk/dvrk_frames.h"
+#include "lapservo/geometry/rotation.h"
 
 namespace lapservo::internal {
+namespace {
 
-ArmPose::ArmPose(Transport& transport, const std::string& arm) {
+constexpr double late_s = 0.07, memory_s = 3, by_motion_of_s = 0.05, ahead_s = 0.1;
+
+// From one pose on to another by that share of the way, which may be above 1.
+Rigid3 between(const Rigid3& from, const Rigid3& to, double share) {
+  const Eigen::Vector3d turn = rotation_vector_of(to.rotation * from.rotation.conjugate());
+  return {rotation_by(share * turn) * from.rotation, from.translation + share * (to.translation - from.translation)};
+}
+
+}  // namespace
+
+ArmPose::ArmPose(Transport& transport, const std::string& arm, const Clock& clock) : clock_(clock), stamps_(late_s) {
   for (const bool local : {true, false})
     subscriptions_.push_back(
         transport.subscribe_places(topic_of(arm, local ? "local/measured_cp" : "measured_cp"),
-                                   [this, local](PlaceMessage&& message) { take(std::move(message), local); }));
+                                   [this, local](PlaceMessage&& message) { take(message, local); }));
 }
 
 ArmPose::~ArmPose() {
   subscriptions_.clear();
 }
 
-void ArmPose::take(PlaceMessage&& message, bool local) {
+void ArmPose::take(const PlaceMessage& message, bool local) {
   constexpr double plain = 1e-3;  // the norm's rounding
-  Rigid3& pose = message.pose;
-  if (!pose.translation.allFinite() || !(std::abs(pose.rotation.norm() - 1) < plain)) return;
-  pose.rotation.normalize();
+  const double arrival_s = clock_.now_s();
+  const auto& [rotation, translation] = message.pose;
+  if (!translation.allFinite() || !(std::abs(rotation.norm() - 1) < plain)) return;
   const std::lock_guard lock(mutex_);
   if (local_ && !local) return;
+  if (local && !local_) stamps_ = StampClock(late_s), poses_.clear();
   local_ = local;
-  newest_ = std::move(message);
+  const StampClock::Reading reading = stamps_.read(message.stamp_s, arrival_s);
+  if (reading.verdict != StampVerdict::fresh || (!poses_.empty() && reading.time_s <= poses_.back().time_s)) return;
+  poses_.push_back({reading.time_s, {rotation.normalized(), translation}});
+  while (poses_.back().time_s - poses_.front().time_s > memory_s) poses_.pop_front();
 }
 
-std::optional<PlaceMessage> ArmPose::newest() const {
+std::optional<Rigid3> ArmPose::newest() const {
   const std::lock_guard lock(mutex_);
-  return newest_;
+  return poses_.empty() ? std::nullopt : std::optional(poses_.back().pose);
+}
+
+std::optional<Rigid3> ArmPose::at(double time_s) const {
+  const std::lock_guard lock(mutex_);
+  if (poses_.empty() || time_s < poses_.front().time_s || time_s > poses_.back().time_s + ahead_s) return std::nullopt;
+  const auto first_after = [this](double than_s) {
+    return std::upper_bound(poses_.begin(), poses_.end(), than_s,
+                            [](double at_s, const Pose& pose) { return at_s < pose.time_s; });
+  };
+  auto to = first_after(time_s);
+  auto from = to;
+  if (to != poses_.end()) {
+    --from;
+  } else {
+    from = first_after(poses_.back().time_s - by_motion_of_s), --to;
+    if (from != poses_.begin()) --from;
+  }
+  if (from == to) return to->pose;
+  return between(from->pose, to->pose, (time_s - from->time_s) / (to->time_s - from->time_s));
+}
+
+bool HeldEndoscope::begin() {
+  const auto pose = arm_.newest();
+  if (pose) first_from_base_ = (*pose * dvrk_from_camera()).inverse();
+  return pose.has_value();
+}
+
+std::optional<Rigid3> HeldEndoscope::first_from_camera(double time_s) const {
+  const auto pose = arm_.at(time_s);
+  if (!pose || !first_from_base_) return std::nullopt;
+  return *first_from_base_ * *pose * dvrk_from_camera();
 }
 
 }  // namespace lapservo::internal

@@ -1,31 +1,60 @@
 #pragma once
 
+#include <deque>
 #include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "lapservo/crtk/stamp_clock.h"
 #include "lapservo/crtk/transport.h"
+#include "lapservo/robot/clock.h"
+#include "lapservo/stream/endoscope_pose.h"
 
 namespace lapservo::internal {
 
-/// The pose that a CRTK arm reports: local/measured_cp, or measured_cp of an arm that has no other.
+/// The pose that a CRTK arm reports: local/measured_cp, or measured_cp of an arm that has no other. Poses that are not
+/// finite, or whose rotation is none, do not count.
 class ArmPose {
  public:
-  /// `arm`: as in CrtkRobot. The transport must outlive it.
-  ArmPose(Transport& transport, const std::string& arm);
+  /// `arm`: as in CrtkRobot. The transport and the clock must outlive it.
+  ArmPose(Transport& transport, const std::string& arm, const Clock& clock);
   ~ArmPose();
 
-  /// The newest; nullopt while none has come. One that is not finite or whose rotation is none does not count.
-  std::optional<PlaceMessage> newest() const;
+  /// nullopt while none has come.
+  std::optional<Rigid3> newest() const;
+  /// On the clock, by stamps (StampClock): within the last 3 s interpolated, up to 0.1 s after the newest extrapolated
+  /// by the motion of the last 0.05 s; else nullopt.
+  std::optional<Rigid3> at(double time_s) const;
 
  private:
-  void take(PlaceMessage&& message, bool local);
+  struct Pose {
+    double time_s = 0;
+    Rigid3 pose;
+  };
+  void take(const PlaceMessage& message, bool local);
 
+  const Clock& clock_;
   mutable std::mutex mutex_;
-  std::optional<PlaceMessage> newest_;
+  StampClock stamps_;
+  std::deque<Pose> poses_;
   bool local_ = false;
   std::vector<Transport::Subscription> subscriptions_;  // last: they use the others
+};
+
+/// The endoscope that such an arm holds, a dVRK's ECM for example: measured_cp is where the camera's frame lies in
+/// dVRK's convention (dvrk_from_camera()).
+class HeldEndoscope : public EndoscopePose {
+ public:
+  /// `arm` must outlive it.
+  explicit HeldEndoscope(const ArmPose& arm) : arm_(arm) {}
+  /// Where it is now is its first place. False, and nothing done, while the arm has reported none.
+  bool begin();
+  std::optional<Rigid3> first_from_camera(double time_s) const override;
+
+ private:
+  const ArmPose& arm_;
+  std::optional<Rigid3> first_from_base_;
 };
 
 }  // namespace lapservo::internal

@@ -4,32 +4,83 @@
 
 #include <gtest/gtest.h>
 
+#include "lapservo/crtk/dvrk_frames.h"
 #include "lapservo/crtk/test_transport.h"
+#include "lapservo/geometry/rotation.h"
 
 namespace lapservo::internal {
 namespace {
 
-PlaceMessage at(double x) {
-  return {1, "", {Eigen::Quaterniond::Identity(), {x, 0, 0}}};
+// As far on as the messages are.
+struct MessageClock : Clock {
+  double now = 0;
+  double now_s() const override { return now; }
+  void sleep_until(double) override {}
+};
+
+class ArmPoseTest : public ::testing::Test {
+ protected:
+  // From a computer whose clock is 100 s ahead, 10 ms on its way.
+  void say(const std::string& topic, double time_s, const Rigid3& pose) {
+    clock_.now = time_s + 0.01;
+    transport_.say(topic, PlaceMessage{time_s + 100, "", pose});
+  }
+  static Rigid3 at(double x) { return {Eigen::Quaterniond::Identity(), {x, 0, 0}}; }
+
+  TestTransport transport_;
+  MessageClock clock_;
+};
+
+TEST_F(ArmPoseTest, IsTheArmsOwnWhereThereIsOne) {
+  const ArmPose pose(transport_, "/dvrk/ECM", clock_);
+  EXPECT_FALSE(pose.newest());
+  say("/dvrk/ECM/measured_cp", 1, at(1));
+  EXPECT_EQ(pose.newest()->translation.x(), 1);
+  say("/dvrk/ECM/local/measured_cp", 2, at(2));
+  say("/dvrk/ECM/measured_cp", 3, at(3));
+  EXPECT_EQ(pose.newest()->translation.x(), 2);
 }
 
-TEST(ArmPose, IsTheArmsOwnWhereThereIsOne) {
-  TestTransport transport;
-  const ArmPose pose(transport, "/dvrk/ECM");
+TEST_F(ArmPoseTest, OneThatIsNoneDoesNotCount) {
+  const ArmPose pose(transport_, "ECM", clock_);
+  say("/ECM/measured_cp", 1, at(std::numeric_limits<double>::quiet_NaN()));
+  say("/ECM/measured_cp", 2, {Eigen::Quaterniond(0, 0, 0, 0), {1, 0, 0}});
   EXPECT_FALSE(pose.newest());
-  transport.say("/dvrk/ECM/measured_cp", at(1));
-  EXPECT_EQ(pose.newest()->pose.translation.x(), 1);
-  transport.say("/dvrk/ECM/local/measured_cp", at(2));
-  transport.say("/dvrk/ECM/measured_cp", at(3));
-  EXPECT_EQ(pose.newest()->pose.translation.x(), 2);
 }
 
-TEST(ArmPose, OneThatIsNoneDoesNotCount) {
-  TestTransport transport;
-  const ArmPose pose(transport, "ECM");
-  transport.say("/ECM/measured_cp", at(std::numeric_limits<double>::quiet_NaN()));
-  transport.say("/ECM/measured_cp", PlaceMessage{1, "", {Eigen::Quaterniond(0, 0, 0, 0), {1, 0, 0}}});
-  EXPECT_FALSE(pose.newest());
+// A constant twist comes back at every time between the messages and 0.1 s beyond, and nothing farther. The time is the
+// fastest message's: 10 ms late.
+TEST_F(ArmPoseTest, FollowsAConstantTwist) {
+  const ArmPose pose(transport_, "ECM", clock_);
+  const auto true_at = [](double time_s) {
+    return Rigid3{rotation_by(time_s * Eigen::Vector3d(0.02, -0.03, 0.04)), time_s * Eigen::Vector3d(4, 2, -3)};
+  };
+  for (int k = 0; k <= 200; ++k) say("/ECM/local/measured_cp", 0.01 * k, true_at(0.01 * k));
+  for (double time_s = 0.013; time_s < 2.1; time_s += 0.0123) {
+    const auto now = pose.at(time_s + 0.01);
+    ASSERT_TRUE(now) << time_s;
+    EXPECT_LT((now->translation - true_at(time_s).translation).norm(), 1e-6) << time_s;
+    EXPECT_LT(now->rotation.angularDistance(true_at(time_s).rotation), 1e-6) << time_s;
+  }
+  EXPECT_FALSE(pose.at(-0.1));
+  EXPECT_FALSE(pose.at(2.12));
+}
+
+// The camera goes as the ECM's tip, whose frame is turned by pi about the view.
+TEST_F(ArmPoseTest, TheEndoscopeGoesAsItsArm) {
+  const ArmPose arm(transport_, "ECM", clock_);
+  HeldEndoscope endoscope(arm);
+  EXPECT_FALSE(endoscope.begin());
+  const Rigid3 first{Eigen::Quaterniond(0.3, -0.2, 0.9, 0.1).normalized(), {0.1, 0.2, -0.1}};
+  say("/ECM/local/measured_cp", 1, first);
+  EXPECT_FALSE(endoscope.first_from_camera(1.01));
+  ASSERT_TRUE(endoscope.begin());
+  const Rigid3 by{rotation_by({0.1, 0, 0.2}), {0.01, 0.02, 0.03}};  // in the camera's own frame
+  say("/ECM/local/measured_cp", 1.05, first * dvrk_from_camera() * by * dvrk_from_camera().inverse());
+  const auto moved = endoscope.first_from_camera(1.06);
+  ASSERT_TRUE(moved);
+  EXPECT_LT((moved->translation - by.translation).norm(), 1e-9);
+  EXPECT_LT(moved->rotation.angularDistance(by.rotation), 1e-7);
 }
 
 }  // namespace

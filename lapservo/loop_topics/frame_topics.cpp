@@ -78,9 +78,10 @@ PoseMessage pose_message(const Observation::MarkerPose& seen) {
   return message_of(seen.camera_from_marker, covariance);
 }
 
-FrameTopics::FrameTopics(Transport& transport, const Rig& rig, const FrameNames& names)
+FrameTopics::FrameTopics(Transport& transport, const Rig& rig, const FrameNames& names, bool rcm_moves)
     : transport_(transport),
       names_(names),
+      rcm_moves_(rcm_moves),
       moving_(transport.transform_publisher("/tf")),
       resting_(transport.static_transform_publisher("/tf_static")) {
   for (const Instrument& instrument : rig.instruments) {
@@ -97,6 +98,7 @@ FrameTopics::FrameTopics(Transport& transport, const Rig& rig, const FrameNames&
 
 // All of them: subscribers that come later get the last message only.
 void FrameTopics::tell_rcms() {
+  if (rcm_moves_) return;
   StaticTransformsMessage message;
   message.stamp_s = transport_.stamp_now_s();
   for (const Told& one : told_)
@@ -126,6 +128,7 @@ void FrameTopics::publish(std::size_t index, const Observation& seen, const std:
     Rigid3 rcm_from_shaft = rcm_from_unrolled(*q);
     rcm_from_shaft.rotation = rcm_from_shaft.rotation * Eigen::AngleAxisd(q->psi_rad, Eigen::Vector3d::UnitZ());
     rcm_from_shaft.translation.setZero();
+    if (rcm_moves_) frames.transforms.push_back({told.names.camera, told.names.rcm, *camera_from_rcm});
     frames.transforms.push_back({told.names.camera, told.names.shaft, *camera_from_rcm * rcm_from_shaft});
   }
   moving_(frames);

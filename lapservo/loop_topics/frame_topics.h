@@ -22,8 +22,9 @@ struct FrameNames {
 /// shaft from the RCM on as cylinders. Unknown ones are left out.
 class FrameTopics {
  public:
-  /// `rig`: all its instruments. The transport must outlive it.
-  FrameTopics(Transport& transport, const Rig& rig, const FrameNames& names);
+  /// `rig`: all its instruments. `rcm_moves`: the RCM frame moves in the camera frame, and is in /tf of every image
+  /// instead. The transport must outlive it.
+  FrameTopics(Transport& transport, const Rig& rig, const FrameNames& names, bool rcm_moves = false);
 
   /// The rig's instrument `index` in an image of that stamp; `camera_from_rcm`: that which it was measured with.
   void publish(std::size_t index, const Observation& seen, const std::optional<Rigid3>& camera_from_rcm,
@@ -42,6 +43,7 @@ class FrameTopics {
 
   Transport& transport_;
   FrameNames names_;
+  bool rcm_moves_;
   Transport::Publisher<TransformsMessage> moving_;
   Transport::Publisher<StaticTransformsMessage> resting_;
   std::vector<Told> told_;

@@ -67,6 +67,18 @@ TEST(FrameTopics, TheRcmIsSaidAgainOnlyWhenItIsAnotherOne) {
   EXPECT_EQ(resting[1].transforms.at(0).frame_from_child, other);
 }
 
+TEST(FrameTopics, AnRcmThatMovesIsInEveryImages) {
+  const Rig rig = testing::small_test_rig();
+  TestTransport transport;
+  FrameTopics topics(transport, rig, {}, true);
+  topics.publish(0, seen_at(there), rig.instruments[0].camera_from_rcm, 5);
+  EXPECT_TRUE(transport.sent<StaticTransformsMessage>("/tf_static").empty());
+  const auto frames = transport.sent<TransformsMessage>("/tf").at(0).transforms;
+  ASSERT_EQ(frames.size(), 3u);
+  EXPECT_EQ(frames[1].child, "PSM1_rcm");
+  EXPECT_EQ(frames[1].frame_from_child, *rig.instruments[0].camera_from_rcm);
+}
+
 // The bands lie end to end along the marker, in the print's colours, and the shaft ends where they begin.
 TEST(FrameTopics, CylindersAreTheMarkerAndTheShaft) {
   const Rig rig = testing::small_test_rig();

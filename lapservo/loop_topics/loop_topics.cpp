@@ -76,11 +76,11 @@ std::optional<Trajectory> trajectory_of(const TrajectoryMessage& message) {
 
 }  // namespace
 
-LoopTopics::LoopTopics(Transport& transport, const Rig& rig, const FrameNames& frames, bool hears)
+LoopTopics::LoopTopics(Transport& transport, const Rig& rig, const FrameNames& frames, bool rcm_moves, bool hears)
     : transport_(transport),
       rig_(rig),
       observation_(transport.observation_publisher(topic(rig, "observation"))),
-      frames_(transport, first_instrument(rig, "rig"), frames),
+      frames_(transport, first_instrument(rig, "rig"), frames, rcm_moves),
       desired_(transport.joint_publisher(topic(rig, "desired"))),
       error_(transport.joint_publisher(topic(rig, "error"))),
       diagnostics_(transport.diagnostic_publisher("/diagnostics")),
@@ -117,7 +117,7 @@ void LoopTopics::publish(const ControlTick& tick, const std::string& state) {
   publish_observation(tick, seen_s);
   if (stamp_s < next_drawing_s_) return;
   next_drawing_s_ = stamp_s + between_drawings_s;
-  to_draw_.push_over_oldest({seen_s, tick.seen->image.bgr, tick.seen->observations, tick.decision.camera_from_rcm});
+  to_draw_.push_over_oldest({seen_s, tick.seen->image.bgr, tick.seen->observations, tick.seen->camera_from_rcm});
 }
 
 void LoopTopics::publish_numbers(const ControlTick& tick, double stamp_s) {
@@ -131,8 +131,8 @@ void LoopTopics::publish_numbers(const ControlTick& tick, double stamp_s) {
 void LoopTopics::publish_observation(const ControlTick& tick, double stamp_s) {
   const Observation& seen = tick.seen->observations.front();
   const ImageMeasurement& measured = tick.seen->measurement;
-  Instrument instrument = rig_.instruments.front();
-  if (tick.decision.registration > 0) instrument.camera_from_rcm = tick.decision.camera_from_rcm;
+  const Instrument& instrument = rig_.instruments.front();
+  const auto& camera_from_rcm = tick.seen->camera_from_rcm;
   const bool current = measured.registration == tick.decision.registration;
   ObservationMessage message;
   message.stamp_s = stamp_s;
@@ -152,11 +152,11 @@ void LoopTopics::publish_observation(const ControlTick& tick, double stamp_s) {
   if (seen.status == Status::ok)
     for (std::size_t i = 0; i < 4; ++i)
       message.edges_px[2 * i] = seen.edges_raw_px[i].x(), message.edges_px[2 * i + 1] = seen.edges_raw_px[i].y();
-  if (seen.status == Status::ok && seen.rcm && instrument.camera_from_rcm && current) {
+  if (seen.status == Status::ok && seen.rcm && camera_from_rcm && current) {
     message.q = rows_of<4>(seen.rcm->q.vector());
     message.q_covariance = rows_of<16>(seen.rcm->covariance);
   }
-  frames_.publish(0, seen, current ? instrument.camera_from_rcm : std::nullopt, stamp_s);
+  frames_.publish(0, seen, current ? camera_from_rcm : std::nullopt, stamp_s);
   observation_(message);
 }
 

@@ -43,8 +43,8 @@ struct LoopWishes {
 /// repeated counts once: it would start the arm by itself after each hold.
 class LoopTopics {
  public:
-  /// `hears`: whether it hears anything; else it only publishes.
-  LoopTopics(Transport& transport, const Rig& rig, const FrameNames& frames, bool hears = true);
+  /// `rcm_moves`: as in FrameTopics. `hears`: whether it hears anything; else it only publishes.
+  LoopTopics(Transport& transport, const Rig& rig, const FrameNames& frames, bool rcm_moves = false, bool hears = true);
   ~LoopTopics();
 
   /// `state`: the loop's, in words; empty where it tracks.

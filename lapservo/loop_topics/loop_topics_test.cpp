@@ -30,6 +30,7 @@ ControlTick tick_of(const Rig& rig) {
   seen.status = Status::ok;
   seen.rcm = Observation::Rcm{there, Eigen::Vector4d(1e-6, 2e-6, 1e-8, 4e-6).asDiagonal()};
   tick.seen->observations = {seen};
+  tick.seen->camera_from_rcm = rig.instruments.front().camera_from_rcm;
   tick.seen->measurement.found = true;
   tick.seen->measurement.features = {0.901, 401, 182, 103};
   return tick;
@@ -148,7 +149,7 @@ TEST(LoopTopics, AStartThatIsRepeatedCountsOnce) {
 
 TEST(LoopTopics, KnowsAnotherLoopOfItsName) {
   TestTransport transport;
-  LoopTopics topics(transport, testing::small_test_rig(), {}, false);
+  LoopTopics topics(transport, testing::small_test_rig(), {}, false, false);
   topics.publish(tick_of(testing::small_test_rig()), "");
   EXPECT_FALSE(topics.name_is_in_use());
   transport.say("/lapservo/PSM1/desired", JointMessage{});
@@ -157,7 +158,7 @@ TEST(LoopTopics, KnowsAnotherLoopOfItsName) {
 
 TEST(LoopTopics, HearsNothingWhereNobodyMayCommand) {
   TestTransport transport;
-  LoopTopics topics(transport, testing::small_test_rig(), {}, false);
+  LoopTopics topics(transport, testing::small_test_rig(), {}, false, false);
   transport.say("/lapservo/PSM1/command", StringMessage{0, "start"});
   EXPECT_TRUE(topics.wishes().starts.empty());
 }

@@ -10,6 +10,7 @@
 #include "lapservo/control/trajectory_check.h"
 #include "lapservo/core/error.h"
 #include "lapservo/servo/image_features.h"
+#include "lapservo/servo/moving_camera.h"
 #include "lapservo/servo/servo.h"
 #include "lapservo/servo/track_images.h"
 
@@ -130,9 +131,12 @@ void run(Supervisor& arm, ImageStream& images, Clock& clock, const RunConfig& co
   refuse_at_once(arm, clock, config, duration_s);
   ControllerConfig controller = config.controller;
   if (config.arm_limits) controller.limits = *config.arm_limits;
+  std::optional<MovingCamera> moving;
+  if (config.endoscope) moving.emplace(*config.endoscope, config.rig, controller.scales), controller.window.reset();
   FirstSight first_sight(config, controller, trajectory, duration_s);
   Servo servo(controller, config.rig);
-  const auto vision = track_images(images, config.rig, config.tracker, config.rcm_px, config.tracking_thread);
+  const auto vision =
+      track_images(images, config.rig, config.tracker, config.rcm_px, config.tracking_thread, config.endoscope);
   const double period_s = controller.period_s, start_s = clock.now_s();
   const auto ticks = std::lround(duration_s / period_s);
   const BrakesAtTheEnd brakes(arm, clock, controller);
@@ -144,9 +148,14 @@ void run(Supervisor& arm, ImageStream& images, Clock& clock, const RunConfig& co
     tick.input.time_s = clock.now_s();
     tick.input.readings = arm.readings();
     tick.input.joints = arm.state();
-    tick.input.desired = trajectory.at(tick.input.time_s - start_s);
+    const double since_s = tick.input.time_s - start_s;
+    tick.input.desired = trajectory.at(since_s);
     first_sight.check(tick, arm);
     if (tick.seen) tick.input.image = tick.seen->measurement;
+    if (moving) {
+      vision->set_delay(servo.controller().delay_s());
+      moving->carry(tick.input, since_s, trajectory, tick.seen ? tick.seen->first_from_camera : Rigid3());
+    }
     tick.decision = servo.step(tick.input);
     if (tick.decision.send) arm.send(servo.path());
     if (tick.decision.release) arm.release();
@@ -154,6 +163,7 @@ void run(Supervisor& arm, ImageStream& images, Clock& clock, const RunConfig& co
     if (tick.decision.registration != registration) {
       registration = tick.decision.registration;
       vision->use(tick.decision);
+      if (moving) moving->use(tick.decision.camera_from_rcm);
     }
     withhold_contradicted(tick);
     go_on = observer.on_tick(tick);

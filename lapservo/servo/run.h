@@ -13,6 +13,7 @@
 #include "lapservo/robot/supervisor.h"
 #include "lapservo/servo/servo_decision.h"
 #include "lapservo/servo/tracked_image.h"
+#include "lapservo/stream/endoscope_pose.h"
 #include "lapservo/stream/image_stream.h"
 #include "lapservo/vision/tracker.h"
 
@@ -27,6 +28,10 @@ struct RunConfig {
   /// Limits of the arm's q, in the place of controller.limits: run() needs them with an arm that is not simulated.
   std::optional<JointLimits> arm_limits{};
   std::string trajectory_name = "trajectory";  ///< in complaints
+  /// Of an endoscope that moves, which must outlive run(); needs the rig's camera_from_rcm, which is that of its first
+  /// place. All of the loop, its log and ServoInput included, then works in the image of the camera in that place, to
+  /// which images and goals are carried; the window of the image does not count.
+  const EndoscopePose* endoscope = nullptr;
 };
 
 /// One control tick: what the loop went by, what it decided, and the image that came, if one did.

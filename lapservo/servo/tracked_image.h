@@ -13,6 +13,8 @@ struct TrackedImage {
   StampedImage image;
   std::vector<Observation> observations;  ///< one an instrument of the rig
   ImageMeasurement measurement;           ///< of the rig's first instrument
+  std::optional<Rigid3> camera_from_rcm;  ///< of that instrument, as it was tracked with
+  Rigid3 first_from_camera{};             ///< EndoscopePose's at its exposure, where there is one
 };
 
 enum class TrackingThread {

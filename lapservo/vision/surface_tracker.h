@@ -34,6 +34,8 @@ class SurfaceTracker {
   void forget(std::size_t instrument);
   /// Forgets all of the frames before, what they showed of the prints as well.
   void forget();
+  /// Tracker::set_registration().
+  void set_registration(std::size_t i, const Instrument& moved) { registrations_[i] = registration_of(moved); }
   void set_frame_budget(std::optional<double> units) { frame_budget_ = units; }
 
  private:

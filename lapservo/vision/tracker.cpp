@@ -125,6 +125,15 @@ std::vector<Observation> Tracker::track(const cv::Mat& image_bgr) && {
   return track(image_bgr);  // the overload above: *this is an lvalue here
 }
 
+void Tracker::set_registration(std::size_t instrument, const Rigid3& camera_from_rcm,
+                               const Eigen::Matrix<double, 6, 6>& covariance) {
+  Instrument& moved = state_->rig.instruments.at(instrument);
+  moved.camera_from_rcm = camera_from_rcm;
+  moved.registration_covariance = covariance;
+  state_->surface.set_registration(instrument, moved);
+  state_->centerline.set_registration(instrument, camera_from_rcm);
+}
+
 const std::vector<Observation>& Tracker::refuse(Status why) & {
   for (std::size_t i = 0; i < state_->rig.instruments.size(); ++i) state_->surface.forget(i);
   Observation refused;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <memory>
 #include <optional>
 #include <string_view>
@@ -56,6 +57,11 @@ class Tracker {
   /// For a tracker that is gone after the expression, as in `Tracker(rig).track(image)`: by value. There is no frame to
   /// come, so this one is searched whole.
   std::vector<Observation> track(const cv::Mat& image_bgr) &&;
+
+  /// Another registration of an instrument that has one, from the next frame on, as of a camera that moves. The
+  /// frames before still count. Throws std::out_of_range for an instrument that the rig has not.
+  void set_registration(std::size_t instrument, const Rigid3& camera_from_rcm,
+                        const Eigen::Matrix<double, 6, 6>& covariance);
 
   /// For a frame whose pixels are not the camera's, as a damaged one's: one observation per instrument, of this status.
   /// Forgets the frame before.

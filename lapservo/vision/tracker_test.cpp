@@ -1,6 +1,7 @@
 #include "lapservo/vision/tracker.h"
 
 #include <cmath>
+#include <stdexcept>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -42,6 +43,26 @@ TEST(Tracker, NamesTheInstrumentWhateverBecomesOfIt) {
   EXPECT_EQ(tracker.track(cv::Mat::zeros(shot.bgr.size(), CV_8UC3))[0].instrument, name);
   EXPECT_EQ(tracker.refuse(Status::damaged)[0].instrument, name);
   EXPECT_EQ(tracker.refuse(Status::damaged)[0].status, Status::damaged);
+}
+
+// As if the rig had said so.
+TEST(Tracker, TakesAnotherRegistration) {
+  const auto& shot = usual_shot(1);
+  for (const Method method : {Method::surface, Method::centerline}) {
+    Rig known = shot.rig, other = shot.rig;
+    known.instruments[0].registration_covariance = Eigen::Matrix<double, 6, 6>::Identity() * 1e-8;
+    other.instruments[0].camera_from_rcm->translation.x() += 0.01;
+    Tracker tracker(other, {.method = method});
+    tracker.set_registration(0, *shot.rig.instruments[0].camera_from_rcm,
+                             *known.instruments[0].registration_covariance);
+    const Observation got = tracker.track(shot.bgr)[0],
+                      expected = Tracker(known, {.method = method}).track(shot.bgr)[0];
+    ASSERT_TRUE(got.rcm && expected.rcm);
+    EXPECT_EQ(got.rcm->q.vector(), expected.rcm->q.vector());
+    EXPECT_EQ(got.rcm->covariance, expected.rcm->covariance);
+    EXPECT_EQ(got.features.r_px, expected.features.r_px);
+  }
+  EXPECT_THROW(Tracker(shot.rig).set_registration(1, {}, Eigen::Matrix<double, 6, 6>::Zero()), std::out_of_range);
 }
 
 TEST(Tracker, RefusesABudgetOfNothing) {

@@ -21,6 +21,9 @@ class CenterlineMethod {
   /// `image_bgr`: 8-bit BGR of the rig's size. One observation per instrument.
   std::vector<Observation> observe(const cv::Mat& image_bgr) const;
 
+  /// Tracker::set_registration().
+  void set_registration(std::size_t i, const Rigid3& moved) { rig_.instruments[i].camera_from_rcm = moved; }
+
  private:
   Rig rig_;
   std::vector<CrossRatioDecoder> decoders_;

@@ -58,12 +58,13 @@ DvrkOutput::DvrkOutput(const DvrkOptions& options, bool has_joints) : options_(o
   if (!options.base_frame.empty()) file_.emplace(options.base_frame);
   if (options.endoscope.empty()) return;
   const Address ecm = address_of(options.endoscope, "--endoscope");
-  const ArmPose pose(transports_.get(ecm.transport, "--endoscope"), ecm.name);
+  const SteadyClock clock;
+  const ArmPose pose(transports_.get(ecm.transport, "--endoscope"), ecm.name, clock);
   if (!wait_until([&] { return pose.newest().has_value(); }))
     throw InputError("--endoscope",
                      fmt::format("is {}, of which no measured_cp came within {:.0f} s: {}", options.endoscope, wait_s,
                                  transports_.unpublished(options.endoscope, "--endoscope", "local/measured_cp")));
-  endoscope_ = pose.newest()->pose;
+  endoscope_ = pose.newest();
 }
 
 void DvrkOutput::write(const Instrument& instrument, const JointRanges& ranges, const std::string& source) {

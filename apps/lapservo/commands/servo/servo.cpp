@@ -146,6 +146,8 @@ int run(const ServoOptions& options) {
   const bool recorded = !bag_of(options.replay).empty();
   if (!options.replay.empty() && options.web.port)
     throw InputError("--web", "is for runs, expected none with --replay");
+  if (!options.endoscope.empty() && (options.robot == "sim" || !options.replay.empty()))
+    throw InputError("--endoscope", "is " + options.endoscope + ", expected none without an arm of a topic");
   if (!options.replay.empty() && options.enable_motion)
     throw InputError("--enable-motion", "moves nothing that was recorded, expected none with --replay");
   if (!options.replay.empty() && !recorded) return replay_log(options);
@@ -168,6 +170,9 @@ void add_arm_options(Command command, ServoOptions& options) {
   command.add_option("--camera", options.camera,
                      "Images of a real arm: ros2:/topic or ros1:/topic, an Image or, where it ends in /compressed, a "
                      "CompressedImage; /dev/videoN; gst:PIPELINE, for example 'gst:decklinkvideosrc ! deinterlace'");
+  command.add_option("--endoscope", options.endoscope,
+                     "The arm that holds the endoscope and may move slowly meanwhile: ros2:ECM, ros1:ECM. The rig's "
+                     "camera_from_rcm is that of the start");
   command
       .add_option("--control", options.control,
                   "Who may say stop and start, and set goals: the page of --web, the topics, which anybody in the "

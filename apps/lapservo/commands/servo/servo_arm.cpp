@@ -19,6 +19,7 @@
 #include "apps/lapservo/inputs/transports.h"
 #include "lapservo/control/trajectory_check.h"
 #include "lapservo/core/error.h"
+#include "lapservo/crtk/arm_pose.h"
 #include "lapservo/crtk/crtk_robot.h"
 #include "lapservo/crtk/joint_map.h"
 #include "lapservo/crtk/operator_presence.h"
@@ -227,6 +228,9 @@ int steer_arm(const ServoOptions& options) {
   RunConfig config = run_config_of(options);
   const Rig rig = config.rig;
   const InterlockConfig interlock = interlock_of(options, config);
+  if (!options.endoscope.empty() &&
+      (config.controller.mode != ControlMode::fused || !rig.instruments.front().camera_from_rcm))
+    throw InputError("--endoscope", "needs camera_from_rcm in the rig and --method default");
   if (config.controller.mode == ControlMode::uncalibrated) forget_registration(config, options);
   config.tracking_thread = TrackingThread::own;
   config.arm_limits = config.controller.limits;  // without --enable-motion they limit what is reported only
@@ -249,10 +253,19 @@ int steer_arm(const ServoOptions& options) {
     arm.watch_operator([&] { return operator_presence->was_present(); });
   }
   // Before the arm is heard, so that another loop of this name is.
-  LoopTopics topics(transport, rig, frames, may_command(options, "topics"));
+  LoopTopics topics(transport, rig, frames, !options.endoscope.empty(), may_command(options, "topics"));
+  std::optional<ArmPose> endoscope_arm;
+  std::optional<HeldEndoscope> endoscope;
+  if (!options.endoscope.empty()) {
+    const Address ecm = address_of(options.endoscope, "--endoscope");
+    endoscope_arm.emplace(transports.get(ecm.transport, "--endoscope"), ecm.name, clock);
+    config.endoscope = &endoscope.emplace(*endoscope_arm);
+  }
   watch_for_interrupts();
   ServoPage* const its_page = page ? &*page : nullptr;
-  const std::string missing = wait_for_topics(options, transports, arm, its_page, clock);
+  std::string missing = wait_for_topics(options, transports, arm, its_page, clock);
+  if (missing.empty() && endoscope && !wait_until([&] { return endoscope->begin(); }, arm, its_page, clock))
+    missing = fmt::format("{}: no measured_cp within {:.0f} s", options.endoscope, wait_s);
   if (page && page->command(arm, clock.now_s())) return end_by_page();
   if (topics.name_is_in_use()) throw InputError("--rig", name_in_use(rig));
   if (!missing.empty()) {
