@@ -22,6 +22,7 @@
 #include "acceptance/tool_test.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/core/csv.h"
+#include "lapservo/crtk/messages.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/sim/boards.h"
 #ifdef LAPSERVO_TEST_BAGS

@@ -5,7 +5,12 @@
 #include <string>
 #include <vector>
 
-#include "lapservo/crtk/messages.h"
+// Not their header: what includes rosbag's is C++17.
+namespace lapservo::internal {
+struct JointMessage;
+struct ImageMessage;
+struct CompressedImageMessage;
+}  // namespace lapservo::internal
 
 namespace lapservo::testing {
 
