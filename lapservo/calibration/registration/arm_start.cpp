@@ -34,8 +34,8 @@ void refuse_apart(const std::vector<TimedPose>& poses, const JointRecording& rec
   if (shared_s > -largest_delay_s) return;
   throw InputError(source,
                    fmt::format("has no time in common with the frames: they run from {:.2f} to {:.2f} s, it from "
-                               "{:.2f} to {:.2f} s",
-                               first_s, last_s, recording.time_s.front(), recording.time_s.back()));
+                               "{:.2f} to {:.2f} s; subtract what time_s has more, so that both begin within {:.0f} s",
+                               first_s, last_s, recording.time_s.front(), recording.time_s.back(), largest_delay_s));
 }
 
 std::string clocks_text(const std::vector<TimedPose>& poses, const JointRecording& recording) {
