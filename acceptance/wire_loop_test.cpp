@@ -520,10 +520,15 @@ TEST_P(FirstWireLoop, RecordsAnArmThatItMovesAndCalibratesFromIt) {
   const std::string calibrate = fmt::format("calibrate registration {} --rig {} --out {} --base-frame {} ",
                                             file("swing"), file("new.yaml"), file("again.yaml"), file("base.json"));
   expect_ends(calibrate + "--set-base-frame " + GetParam() + ":PSM1", 0, "published on /PSM1/set_base_frame");
-  const std::lock_guard lock(mutex);
-  ASSERT_TRUE(base_frame);
+  ASSERT_TRUE(wait_for([&] {
+    const std::lock_guard lock(mutex);
+    return base_frame.has_value();
+  }));
   const Rigid3 dvrk_from_rcm = dvrk_from_camera() * *load_rig(file("again.yaml")).instruments[0].camera_from_rcm;
-  EXPECT_LT((base_frame->pose.translation - dvrk_from_rcm.translation).norm(), 1e-9);
+  {
+    const std::lock_guard lock(mutex);
+    EXPECT_LT((base_frame->pose.translation - dvrk_from_rcm.translation).norm(), 1e-9);
+  }
   EXPECT_NE(said("base.json").find("\"base_frame\""), std::string::npos) << said("base.json");
   const auto ecm = ears_->place_publisher("/ECM/local/measured_cp");
   Process held(calibrate + "--endoscope " + GetParam() + ":ECM", file("held.txt"));

@@ -88,8 +88,12 @@ void DvrkOutput::publish(const Rigid3& camera_from_base) {
   const auto say = transport.place_publisher(topic);
   if (!wait_until([&] { return !transport.readers(topic).empty(); }))
     throw InputError("--set-base-frame", fmt::format("{} has no reader within {:.0f} s", topic, wait_s));
-  say({transport.stamp_now_s(), options_.reference_frame, dvrk_from_camera() * camera_from_base});
-  std::this_thread::sleep_for(std::chrono::milliseconds(500));  // until it has left
+  // Again and again: a reader that is known here may not know this writer yet.
+  constexpr int times = 10;
+  for (int i = 0; i < times; ++i) {
+    say({transport.stamp_now_s(), options_.reference_frame, dvrk_from_camera() * camera_from_base});
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  }
   std::printf("base frame: published on %s\n", topic.c_str());
 }
 
