@@ -23,10 +23,6 @@ PoseMessage message_of(const Rigid3& pose, const Eigen::Matrix<double, 6, 6>& co
   return message;
 }
 
-Rigid3 rigid_of(const PoseMessage& pose) {
-  return {Eigen::Quaterniond(Eigen::Vector4d(pose.quaternion_xyzw.data())), Eigen::Vector3d(pose.position_m.data())};
-}
-
 std::string with_name(std::string frame, const std::string& instrument) {
   const std::size_t at = frame.find("NAME");
   return at == std::string::npos ? frame : frame.replace(at, 4, instrument);
@@ -120,7 +116,8 @@ void FrameTopics::publish(std::size_t index, const Observation& seen, const std:
   pose.stamp_s = stamp_s;
   pose.frame = told.names.camera;
   told.pose(pose);
-  const Rigid3 camera_from_marker = rigid_of(pose);
+  const Rigid3 camera_from_marker =
+      has_q ? camera_from_marker_at(told.instrument, seen.rcm->q) : seen.marker->camera_from_marker;
   TransformsMessage frames{stamp_s, {{told.names.camera, told.names.marker, camera_from_marker}}};
   std::optional<JointVector> q;
   if (has_q) {

@@ -98,18 +98,27 @@ float size_by(const Value& change, const Value& seen) {
   return seen.norm() / change.norm();
 }
 
+// Where a fit has the boundaries, and what changes there.
+struct FittedBoundaries {
+  Boundaries places;
+  std::array<Value, 4> changes;
+
+  FittedBoundaries(const Scene& scene, const ShaftPose& pose) : places(boundaries_in_image(scene, pose, line_count)) {
+    for (std::size_t k = 0; k < 4; ++k) changes[k] = change_of(scene, places[k], edge_px);
+  }
+};
+
 // The change of values at other places by that at the boundaries: the median over the places that are so far away;
 // nullopt where these are few.
 template <class Ratio>
-std::optional<float> change_at(const Scene& scene, const Boundaries& boundaries, const Boundaries& places,
+std::optional<float> change_at(const Scene& scene, const FittedBoundaries& fitted, const Boundaries& places,
                                double apart_px, int pixels, const Ratio& ratio) {
   InplaceVector<float, 4 * line_count> ratios;
   for (std::size_t k = 0; k < 4; ++k) {
-    const Value change = change_of(scene, boundaries[k], edge_px);
-    if (!(change.squaredNorm() > 0)) continue;
+    if (!(fitted.changes[k].squaredNorm() > 0)) continue;
     for (const BoundaryPoint& place : places[k])
-      if (!is_near(boundaries, place.raw_px, apart_px))
-        if (const auto seen = change_at(scene, place, pixels)) ratios.push_back(ratio(change, *seen));
+      if (!is_near(fitted.places, place.raw_px, apart_px))
+        if (const auto seen = change_at(scene, place, pixels)) ratios.push_back(ratio(fitted.changes[k], *seen));
   }
   return ratios.size() < limits.min_points ? std::nullopt : std::optional(median(ratios));
 }
@@ -125,11 +134,11 @@ bool moves_far(const Scene& scene, const PoseUnknowns& from, const PoseUnknowns&
 }
 
 // Motion blur has no place between where nothing changes.
-bool shows_twice(const Scene& scene, const PoseUnknowns& fitted, const PoseVector& step) {
+bool shows_twice(const Scene& scene, const PoseUnknowns& pose, const FittedBoundaries& boundaries,
+                 const PoseVector& step) {
   const auto moved_by = [&](double steps) {
-    return boundaries_in_image(scene, fitted.changed_by(steps * step).pose(), line_count);
+    return boundaries_in_image(scene, pose.changed_by(steps * step).pose(), line_count);
   };
-  const Boundaries boundaries = moved_by(0);
   const auto part = change_at(scene, boundaries, moved_by(1), limits.apart_px, edge_px, part_of);
   if (!part || *part < limits.least_part) return false;
   const auto amid = change_at(scene, boundaries, moved_by(0.5), limits.apart_px / 2, amid_px, size_by);
@@ -140,13 +149,17 @@ bool shows_twice(const Scene& scene, const PoseUnknowns& fitted, const PoseVecto
 
 bool shows_two_moments(const Scene& scene, const FineFit& fit, const std::array<std::optional<ShaftPose>, 2>& before) {
   const PoseUnknowns& fitted = fit.unknowns;
+  std::optional<FittedBoundaries> boundaries;
   std::optional<ShaftPose> after = fitted.pose();
   for (const auto& pose : before) {
     if (pose && after) {
       const PoseUnknowns from(*pose, fitted.through_rcm()), to(*after, fitted.through_rcm());
       const PoseVector step = from.change_to(to);
-      if (moves_far(scene, from, to) && (shows_twice(scene, fitted, step) || shows_twice(scene, fitted, -step)))
-        return true;
+      if (moves_far(scene, from, to)) {
+        if (!boundaries) boundaries.emplace(scene, fitted.pose());
+        if (shows_twice(scene, fitted, *boundaries, step) || shows_twice(scene, fitted, *boundaries, -step))
+          return true;
+      }
     }
     after = pose;
   }

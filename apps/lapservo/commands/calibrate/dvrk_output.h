@@ -25,9 +25,6 @@ class DvrkOutput {
   /// `ranges`: of the joints' readings. Throws InputError as dvrk_base(), naming `source`.
   void write(const Instrument& instrument, const internal::JointRanges& ranges, const std::string& source);
 
-  /// The ECM's pose at the time.
-  const std::optional<Rigid3>& endoscope() const { return endoscope_; }
-
  private:
   void publish(const Rigid3& camera_from_base);
 
