@@ -8,19 +8,24 @@
 #include "lapservo/marker/decoder.h"
 #include "lapservo/rig/rig.h"
 
-// Any text is a rig that can be used over its whole image and every rotation, or an InputError.
+// Any text is a rig that can be used over the largest circle amid its image and every rotation, or an InputError.
 namespace {
 using namespace lapservo;
 using namespace lapservo::internal;
 using fuzz::require;
 
 void require_usable(const Camera& camera) {
+  const Eigen::Vector2d middle(0.5 * (camera.width_px - 1), 0.5 * (camera.height_px - 1));
   constexpr int steps = 4;
-  for (int i = 0; i <= steps; ++i)
-    for (int j = 0; j <= steps; ++j) {
-      const Eigen::Vector2d raw((camera.width_px - 1.0) * i / steps, (camera.height_px - 1.0) * j / steps);
+  for (int i = -steps; i <= steps; ++i)
+    for (int j = -steps; j <= steps; ++j) {
+      const Eigen::Vector2d part = Eigen::Vector2d(i, j) / steps;
+      const Eigen::Vector2d raw = middle + middle.cwiseProduct(part);
       const auto ideal = camera.ideal_from_raw(raw);
-      require(ideal && ideal->allFinite(), "every pixel has a ray");
+      const bool in_circle = (raw - middle).norm() < middle.minCoeff();
+      require(ideal || !in_circle, "every pixel of the largest circle amid the image has a ray");
+      if (!ideal) continue;
+      require(ideal->allFinite(), "rays are finite");
       require((camera.raw_from_ideal(*ideal) - raw).norm() < 1e-3, "distortion and its inverse cancel");
     }
   for (const float light : camera.response.table()) require(light >= 0 && light <= 1, "light is between 0 and 1");
