@@ -15,6 +15,7 @@
 #include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/marker/marker.h"
 #include "lapservo/rig/rig.h"
+#include "lapservo/tool/tool.h"
 
 // A marker for a shaft, what to expect of it, a sheet to print.
 #include "lapservo/marker/design.h"

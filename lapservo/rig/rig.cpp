@@ -13,14 +13,16 @@
 
 #include <fmt/format.h>
 
-#include "lapservo/core/dense_matrix.h"
 #include "lapservo/core/joint_units.h"
 #include "lapservo/core/known_keys.h"
 #include "lapservo/core/yaml_field.h"
 #include "lapservo/geometry/invertible.h"
 #include "lapservo/marker/decoder.h"
 #include "lapservo/rig/camera_formats.h"
+#include "lapservo/rig/covariance_field.h"
 #include "lapservo/rig/response_field.h"
+#include "lapservo/rig/tool_field.h"
+#include "lapservo/rig/unit_quaternion.h"
 
 namespace lapservo {
 using namespace internal;
@@ -54,15 +56,7 @@ void check_invertible(const Camera& camera, const YamlField& coefficients) {
     coefficients.fail("not invertible at the image's border", "k1 k2 p1 p2 k3 of a calibration that covers the image");
 }
 
-constexpr double rotation_tolerance = 2e-4;  // what four typed digits leave
-
 // A ROS matrix: rows and cols say how the numbers of data lie.
-void check_shape(const YamlField& field, int rows, int columns) {
-  for (const auto& [key, size] : {std::pair{"rows", rows}, {"cols", columns}})
-    if (const YamlField given = field[key]; given.present() && given.number("a whole number") != size)
-      given.fail(given.value_text(), std::to_string(size));
-}
-
 template <std::size_t N>
 std::array<double, N> parse_matrix(const YamlField& field, int rows, int columns, std::string_view expected) {
   expect_keys(field, {{"rows", "cols", "data"}, {}});
@@ -223,26 +217,7 @@ Marker parse_marker(const YamlField& field) {
 Rigid3 parse_transform(const YamlField& field) {
   expect_keys(field, {{"covariance"}, {"translation_m", "quaternion_xyzw"}});
   const auto t = field["translation_m"].numbers<3>("x y z in metres", 10, "a length within 10 m");
-  const YamlField quaternion = field["quaternion_xyzw"];
-  const auto q = quaternion.numbers<4>("x y z w of a unit quaternion");
-  const Eigen::Quaterniond rotation(q[3], q[0], q[1], q[2]);
-  if (!(std::abs(rotation.norm() - 1) < rotation_tolerance))
-    quaternion.fail("of norm " + std::to_string(rotation.norm()), "x y z w of a unit quaternion, to four digits");
-  // A normalised quaternion keeps its bits, however often a rig is written and read.
-  const bool unit = std::abs(rotation.squaredNorm() - 1) < 1e-14;
-  return {unit ? rotation : rotation.normalized(), {t[0], t[1], t[2]}};
-}
-
-Eigen::Matrix<double, 6, 6> parse_registration_covariance(const YamlField& field) {
-  constexpr auto expected = "36 numbers, a covariance of x y z [m] and rotations about x y z [rad]";
-  const auto numbers = parse_matrix<36>(field, 6, 6, expected);
-  const Eigen::Matrix<double, 6, 6> given(numbers.data());
-  const Eigen::Matrix<double, 6, 6> covariance = (given + given.transpose()) / 2;
-  const double rounding = 1e-9 * covariance.cwiseAbs().maxCoeff();
-  if (!((given - covariance).cwiseAbs().maxCoeff() <= rounding) ||
-      !(eigenvalues_of_symmetric(covariance).minCoeff() >= -rounding))
-    field.fail("not symmetric, or of negative variance", expected);
-  return covariance;
+  return {parse_unit_quaternion(field["quaternion_xyzw"]), {t[0], t[1], t[2]}};
 }
 
 // One that can head a column of our tables.
@@ -273,8 +248,8 @@ Joints parse_joints(const YamlField& field) {
   return joints;
 }
 
-Instrument parse_instrument(const YamlField& field) {
-  expect_keys(field, {{"name", "marker", "camera_from_rcm", "joints"}, {"image_delay_s"}});
+Instrument parse_instrument(const YamlField& field, const fs::path& folder) {
+  expect_keys(field, {{"name", "marker", "camera_from_rcm", "joints", "tool"}, {"image_delay_s"}});
   Instrument instrument;
   instrument.name = field["name"].text("a name");
   if (!is_plain_name(instrument.name))
@@ -285,11 +260,13 @@ Instrument parse_instrument(const YamlField& field) {
     instrument.sigma_translation_m = sigmas_in<3>(transform, "sigma_translation_m");
     instrument.sigma_quaternion_xyzw = sigmas_in<4>(transform, "sigma_quaternion_xyzw");
     if (const YamlField covariance = transform["covariance"]; covariance.present())
-      instrument.registration_covariance = parse_registration_covariance(covariance);
+      instrument.registration_covariance =
+          parse_covariance(covariance, 6, "36 numbers, a covariance of x y z [m] and rotations about x y z [rad]");
   }
   if (const YamlField joints = field["joints"]; joints.present()) instrument.joints = parse_joints(joints);
   if (const YamlField delay = field["image_delay_s"]; delay.present())
     instrument.image_delay_s = delay.number_between(-60, 60, "-60 to 60 (seconds)");
+  if (const YamlField tool = field["tool"]; tool.present()) instrument.tool = parse_tool(tool, folder);
   instrument.sigma_image_delay_s = sigma_in(field, "sigma_image_delay_s");
   return instrument;
 }
@@ -317,7 +294,7 @@ Rig parse_root(const YamlField& root, const fs::path& folder) {
   const YamlField list = root["instruments"];
   const auto fields = list.list("a list of instruments");
   if (fields.empty() || fields.size() > 8) list.fail(list.value_text(), "one to eight instruments");
-  for (const YamlField& field : fields) rig.instruments.push_back(parse_instrument(field));
+  for (const YamlField& field : fields) rig.instruments.push_back(parse_instrument(field, folder));
   check_distinguishable(rig.instruments, fields);
   return rig;
 }

@@ -10,6 +10,7 @@
 #include "lapservo/geometry/camera.h"
 #include "lapservo/geometry/rigid3.h"
 #include "lapservo/marker/marker.h"
+#include "lapservo/tool/tool.h"
 
 namespace lapservo {
 
@@ -34,6 +35,7 @@ struct Instrument {
   /// Covariance of its translation [m], then of a rotation vector about the camera's axes [rad].
   std::optional<Eigen::Matrix<double, 6, 6>> registration_covariance{};
   std::optional<double> sigma_image_delay_s{};
+  std::optional<Tool> tool{};
   bool operator==(const Instrument&) const = default;
 };
 

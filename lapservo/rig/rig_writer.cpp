@@ -27,6 +27,9 @@ std::string text_of(const std::array<Item, N>& items) {
 std::string text_of(const std::vector<double>& numbers) {
   return fmt::format("[{}]", fmt::join(numbers, ", "));
 }
+std::string text_of(const Eigen::Vector3d& point) {
+  return text_of(std::array{point.x(), point.y(), point.z()});
+}
 std::string text_of(const ChromaticAberration& aberration) {
   return fmt::format("{{blue: {}, red: {}}}", aberration.blue, aberration.red);
 }
@@ -122,22 +125,62 @@ std::string transform_yaml(const Instrument& instrument, int indent) {
   return lines.text();
 }
 
-std::string instrument_yaml(const Instrument& instrument) {
-  Lines lines(4);
-  lines.add_map("marker", marker_yaml(instrument.marker, 6));
-  if (instrument.camera_from_rcm) lines.add_map("camera_from_rcm", transform_yaml(instrument, 6));
-  if (instrument.joints) lines.add_map("joints", joints_yaml(*instrument.joints, 6));
-  if (instrument.image_delay_s)
-    lines.add_measured("image_delay_s", *instrument.image_delay_s, instrument.sigma_image_delay_s);
-  return fmt::format("  - name: {}\n{}", quoted(instrument.name), lines.text());
-}
-
 std::string path_yaml(const fs::path& file, const fs::path& destination) {
   std::error_code error;
   const fs::path relative = fs::relative(file, fs::absolute(destination, error).parent_path(), error);
   YAML::Emitter text;
   text << (relative.empty() ? fs::absolute(file, error) : relative).string();
   return text.c_str();
+}
+
+std::string wrist_joints_yaml(const Tool& tool, int indent) {
+  std::string text;
+  for (const WristJoint& joint : tool.wrist)
+    text += fmt::format("{:{}}- {{name: {}, alpha_rad: {}, a_m: {}, theta_rad: {}, d_m: {}}}\n", "", indent,
+                        quoted(joint.name), joint.alpha_rad, joint.a_m, joint.theta_rad, joint.d_m);
+  return text;
+}
+
+void add_wrist(Lines& lines, const Tool& tool, const fs::path& destination) {
+  if (!tool.file.empty() && !destination.empty()) return lines.add("file", path_yaml(tool.file, destination));
+  const Eigen::Quaterniond& q = tool.last_from_tip.rotation;
+  lines.add_map("joints", wrist_joints_yaml(tool, 8));
+  lines.add("tip_in_last_joint_m", text_of(tool.last_from_tip.translation));
+  lines.add("tip_quaternion_xyzw", text_of(std::array{q.x(), q.y(), q.z(), q.w()}));
+  if (tool.snake_like) lines.add("snake_like", "true");
+}
+
+void add_readings(Lines& lines, const std::vector<WristJoint>& wrist) {
+  std::vector<double> offsets, sigmas;
+  for (const WristJoint& joint : wrist) offsets.push_back(joint.offset_rad), sigmas.push_back(joint.sigma_reading_rad);
+  lines.add("offset_rad", text_of(offsets));
+  lines.add("sigma_reading_rad", text_of(sigmas));
+}
+
+std::string tool_yaml(const Tool& tool, const fs::path& destination, int indent) {
+  Lines lines(indent);
+  const bool straight = tool.wrist.empty();
+  if (!straight) add_wrist(lines, tool, destination), add_readings(lines, tool.wrist);
+  if (!tool.place) return lines.text();
+  lines.add(straight ? "tip_in_marker_m" : "wrist_in_marker_m", text_of(tool.place->base_in_marker_m));
+  if (!straight) lines.add("azimuth_rad", text_of(tool.place->azimuth_rad));
+  if (tool.place->covariance.isZero(0)) return lines.text();
+  const Eigen::Index size = straight ? 3 : 4 + static_cast<Eigen::Index>(tool.wrist.size());
+  const Eigen::MatrixXd covariance = tool.place->covariance.topLeftCorner(size, size);
+  lines.add("covariance", matrix_text(static_cast<int>(size),
+                                      std::vector<double>(covariance.data(), covariance.data() + size * size)));
+  return lines.text();
+}
+
+std::string instrument_yaml(const Instrument& instrument, const fs::path& destination) {
+  Lines lines(4);
+  lines.add_map("marker", marker_yaml(instrument.marker, 6));
+  if (instrument.camera_from_rcm) lines.add_map("camera_from_rcm", transform_yaml(instrument, 6));
+  if (instrument.joints) lines.add_map("joints", joints_yaml(*instrument.joints, 6));
+  if (instrument.image_delay_s)
+    lines.add_measured("image_delay_s", *instrument.image_delay_s, instrument.sigma_image_delay_s);
+  if (instrument.tool) lines.add_map("tool", tool_yaml(*instrument.tool, destination, 6));
+  return fmt::format("  - name: {}\n{}", quoted(instrument.name), lines.text());
 }
 
 }  // namespace
@@ -187,7 +230,7 @@ std::string rig_yaml(const Rig& rig, const fs::path& destination) {
   else
     lines.add_map("camera", camera_yaml(rig.camera, 2));
   std::string instruments;
-  for (const Instrument& instrument : rig.instruments) instruments += instrument_yaml(instrument);
+  for (const Instrument& instrument : rig.instruments) instruments += instrument_yaml(instrument, destination);
   lines.add_map("instruments", instruments);
   return lines.text();
 }

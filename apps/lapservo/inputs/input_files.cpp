@@ -28,6 +28,8 @@ void InputFiles::add(const fs::path& path) {
 void InputFiles::add_rig(const fs::path& path, const Rig& rig) {
   add(path);
   add(rig.camera_file);
+  for (const Instrument& instrument : rig.instruments)
+    if (instrument.tool) add(instrument.tool->file);
 }
 
 void InputFiles::add_pictures_in(const fs::path& folder) {

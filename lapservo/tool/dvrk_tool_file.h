@@ -1,0 +1,19 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+#include "lapservo/tool/tool.h"
+
+namespace lapservo::internal {
+
+/// The wrist of a dVRK tool file (share/tool/*.json of sawIntuitiveResearchKit), without a place: its joints after
+/// `roll` and its tooltip_offset. Its coupling is that of motors to joints, which measured_js has behind it. Throws
+/// InputError naming file, field, value and what was expected.
+Tool read_dvrk_tool(const std::filesystem::path& path);
+
+/// The same from text; `source` stands for the file's name in errors.
+Tool parse_dvrk_tool(std::string_view json, const std::string& source);
+
+}  // namespace lapservo::internal
