@@ -633,6 +633,44 @@ TEST_F(CommandLine, HelpShowsExamples) {
   EXPECT_EQ(run("fly"), 2);
 }
 
+// By a tool in the rig, its wrist's readings beside the frames: columns, overlay, and how well it is known.
+TEST_F(CommandLine, TheTipIsKnownWhereToolAndWristAre) {
+  const std::string joints =
+      "joints: [{name: wrist_pitch, alpha_rad: -1.5707963267949, theta_rad: -1.5707963267949}], "
+      "tip_in_last_joint_m: [0.01, 0, 0]";
+  const std::string plain = read_file("configs/example.yaml");
+  const std::string rig = in("tool.yaml", plain + "    tool: {" + joints +
+                                              ", wrist_in_marker_m: [0, 0, 0.03], azimuth_rad: 0.5, "
+                                              "sigma_wrist_in_marker_m: [0, 0, 1e-5]}\n");
+  std::string poses = "theta_rad,phi_rad,rho_m,psi_rad\n", wrist = "time_s,roll,outer_wrist_pitch\n";
+  for (int i = 0; i < 6; ++i) poses += std::to_string(-0.08 + 0.01 * i) + ",1.7,0.14," + std::to_string(0.1 * i) + "\n";
+  for (int i = -1; i < 60; ++i) wrist += std::to_string(0.05 * i) + ",0," + std::to_string(0.2 + 0.01 * i) + "\n";
+  expect_done("render --rig configs/example.yaml --out in/few --poses " + in("poses.csv", poses));
+  expect_done("track in/few --fps 8 --rig " + rig + " --out out/seen.csv --overlay out/overlay --joints " +
+              in("wrist.csv", wrist));
+  EXPECT_EQ(errors(), "");
+  const CsvTable seen = CsvTable::read("out/seen.csv");
+  for (std::size_t row = 0; row < seen.rows(); ++row) {
+    Eigen::Vector3d marker_to_tip_m;
+    for (int i = 0; i < 3; ++i) {
+      const std::string axis = std::string(1, "xyz"[i]) + "_m";
+      marker_to_tip_m[i] = seen.number(row, "tip_" + axis) - seen.number(row, "marker_" + axis);
+    }
+    const double wrist_rad = 0.2 + 0.01 * static_cast<double>(row) / 8 / 0.05;
+    EXPECT_NEAR(marker_to_tip_m.norm(), std::hypot(0.03 + 0.01 * std::cos(wrist_rad), 0.01 * std::sin(wrist_rad)),
+                1e-7);
+    EXPECT_GT(seen.number(row, "sigma_tip_z_m"), 0);
+  }
+  expect_done("track in/few --rig " + rig + " --out out/unread.csv");
+  EXPECT_EQ(CsvTable::read("out/unread.csv").text(0, "tip_x_m"), "");
+  EXPECT_EQ(errors(),
+            "lapservo: PSM1: no tip: no readings of the wrist's joints wrist_pitch: --joints names a recording or "
+            "topic that has them\n");
+  expect_done("track in/few --rig " + in("unplaced.yaml", plain + "    tool: {" + joints + "}\n") +
+              " --out out/un.csv");
+  expect_in(errors(), "lapservo calibrate tip");
+}
+
 // A swinging arm whose joints are read by another clock, from the other side of its gears: from a rig that knows
 // their names only.
 TEST_F(CommandLine, CalibrateRegistrationWritesWhereTheArmStands) {
@@ -707,6 +745,22 @@ TEST_F(CommandLine, CalibrateRegistrationWritesWhereTheArmStands) {
   expect_in(output(), "not good enough: the rig has no camera_from_rcm");
   EXPECT_EQ(run(check + "out/rig.yaml --out out/rig.yaml"), 2);
   EXPECT_EQ(run("check in/nothing --rig out/rig.yaml"), 2);
+
+  // How well the tip is known, and by which part least, with readings of a wrist.
+  const std::string with_tool = in("tool.yaml", read_file("out/rig.yaml") +
+                                                    "    tool: {joints: [{name: wrist_pitch, alpha_rad: -1.5707963}], "
+                                                    "tip_in_last_joint_m: [0.01, 0, 0], azimuth_rad: 0, "
+                                                    "wrist_in_marker_m: [0, 0, 0.03], sigma_wrist_in_marker_m: "
+                                                    "[0, 0, 0.00002]}\n");
+  std::string with_wrist = std::regex_replace(joints, std::regex("\n"), ",0.3\n");
+  with_wrist.replace(with_wrist.find(",0.3"), 4, ",wrist_pitch");
+  expect_done("check in/swing --fps 8 --rig " + with_tool + " --out out/tip.html --joints " +
+              in("with_wrist.csv", with_wrist));
+  EXPECT_TRUE(std::regex_search(output(), std::regex("tip +known to 0\\.[0-9]+ mm: 0\\.17 from the wrist's joints, ")))
+      << output();
+  expect_in(read_file("out/tip.html"), "from the wrist");
+  expect_done(check + with_tool);
+  expect_in(output(), "unknown: no readings of the wrist's joints wrist_pitch");
 
   // Without joints: from what was tracked without a registration; with one, the axes would pass through it anyway.
   expect_done("track in/swing --rig " + unregistered + " --out out/free.csv");

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
@@ -20,7 +21,7 @@ using namespace internal;
 namespace {
 
 const cv::Scalar white(255, 255, 255), dark(20, 20, 20), outline_colour(255, 255, 255), boundary_colour(40, 220, 255),
-    axis_colour(80, 80, 255), rcm_colour(255, 200, 80), refused_colour(60, 140, 255);
+    axis_colour(80, 80, 255), rcm_colour(255, 200, 80), refused_colour(60, 140, 255), tip_colour(120, 255, 120);
 constexpr double line_height = 30;  // of labels
 
 // Draws at a sixteenth of a pixel, thinner on small frames.
@@ -170,6 +171,28 @@ void draw_rcm(Pen& pen, const Camera& camera, const Instrument& instrument, cons
   pen.label("RCM", px + Eigen::Vector2d(12, -8) * pen.scale());
 }
 
+// A cross, and the ellipse that the tip's image is in with a probability of 95 %.
+void draw_tip(Pen& pen, const Camera& camera, const Observation::Tip& tip) {
+  const Eigen::Vector3d& point = tip.camera_from_tip.translation;
+  if (!(point.z() > 0)) return;
+  const Eigen::Vector2d px = camera.raw_from_point(point);
+  if (!(px.x() >= 0 && px.x() < camera.width_px && px.y() >= 0 && px.y() < camera.height_px)) return;
+  const double step_m = 1e-4 * point.z(), chi = std::sqrt(5.991);  // of two degrees of freedom
+  Eigen::Matrix<double, 2, 3> slopes;
+  for (int i = 0; i < 3; ++i)
+    slopes.col(i) = (camera.raw_from_point(point + step_m * Eigen::Vector3d::Unit(i)) - px) / step_m;
+  const Eigen::Matrix2d rounding = 1e-12 * Eigen::Matrix2d::Identity();
+  const Eigen::Matrix2d covariance_px2 = slopes * tip.covariance.topLeftCorner<3, 3>() * slopes.transpose() + rounding;
+  const Eigen::Matrix2d root_px = covariance_px2.llt().matrixL();
+  std::vector<Eigen::Vector2d> ellipse;
+  constexpr int steps = 48;
+  for (int i = 0; i <= steps; ++i)
+    ellipse.push_back(px + chi * root_px * Eigen::Vector2d(std::cos(two_pi * i / steps), std::sin(two_pi * i / steps)));
+  pen.polyline(ellipse, tip_colour);
+  pen.cross(px, tip_colour);
+  pen.label(fmt::format("tip +-{:.2g} mm", 1e3 * tip.sigma_m()), px + Eigen::Vector2d(12, -8) * pen.scale());
+}
+
 // So many decimals, and no minus zero.
 std::string decimals(double value, int digits) {
   const std::string text = fmt::format("{:.{}f}", value, digits);
@@ -227,6 +250,7 @@ void draw_found(Pen& pen, const Camera& camera, const Instrument& instrument, co
   marker.draw_sides(pen, Style::found);
   for (std::size_t k = 0; k < 4; ++k) marker.draw_boundary(pen, k, Style::found);
   draw_rcm(pen, camera, instrument, o);
+  if (o.tip) draw_tip(pen, camera, *o.tip);
   const Eigen::Vector2d proximal = o.edges_raw_px[0], distal = o.edges_raw_px[3];
   pen.arrow(proximal, distal + 0.25 * (distal - proximal), axis_colour);
   for (const Eigen::Vector2d& edge : o.edges_raw_px) pen.dot(edge, boundary_colour);

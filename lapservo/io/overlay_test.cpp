@@ -55,6 +55,28 @@ TEST(Overlay, MarksTheRcmWhenItLiesInThePicture) {
   EXPECT_GT(drawn_near(frame, overlay, halfway, 15), 10) << "r leads there";
 }
 
+TEST(Overlay, DrawsTheTipWithItsEllipse) {
+  const Rig rig = rig_with_rcm_in_view();
+  const cv::Mat frame = grey_frame(rig);
+  Observation seen = seen_at(rig);
+  seen.tip = Observation::Tip{};
+  Observation::Tip& tip = *seen.tip;
+  tip.camera_from_tip.translation = {0.02, 0.025, 0.1};
+  tip.covariance.diagonal() << 1e-6, 4e-6, 0, 0, 0, 0;
+  const Eigen::Vector2d px = rig.camera.raw_from_point(tip.camera_from_tip.translation);
+  ASSERT_GT(drawn_near(frame, draw_overlay(frame, rig, {seen}), px, 3), 5);
+  const cv::Mat overlay = draw_overlay(frame, rig, {seen});
+  const double chi = std::sqrt(5.991), a_px = rig.camera.fx_px / 0.1 * 1e-3 * chi, b_px = 2 * a_px;
+  for (const Eigen::Vector2d& at : {Eigen::Vector2d(-a_px, 0), Eigen::Vector2d(0, b_px)})
+    EXPECT_GT(drawn_near(frame, overlay, px + at, 2), 3) << at.transpose();
+  EXPECT_EQ(drawn_near(frame, overlay, px + Eigen::Vector2d(-a_px / 2, b_px / 2), 2), 0) << "between cross and ellipse";
+  seen.tip->camera_from_tip.translation.z() = -0.1;
+  Observation without = seen;
+  without.tip.reset();
+  EXPECT_EQ(cv::norm(draw_overlay(frame, rig, {seen}), draw_overlay(frame, rig, {without}), cv::NORM_INF), 0)
+      << "behind the camera";
+}
+
 // A label's backing makes grey of 90 about 32; nothing else of a marker far from its lines has that.
 TEST(Overlay, LabelsStandBesideTheMarker) {
   for (const double direction_rad : {0.1, 0.8, 1.5, 2.4, 3.0, 4.0, 5.5}) {

@@ -65,13 +65,7 @@ PoseMessage pose_message(const Instrument& instrument, const Observation::Rcm& s
 }
 
 PoseMessage pose_message(const Observation::MarkerPose& seen) {
-  const auto square = [](double sigma) { return sigma * sigma; };
-  const Eigen::Vector3d axis = seen.camera_from_marker.rotation * Eigen::Vector3d::UnitZ();
-  const Eigen::Matrix3d along = axis * axis.transpose(), across = Eigen::Matrix3d::Identity() - along;
-  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
-  covariance.diagonal().head<3>() << square(seen.sigma_xy_m), square(seen.sigma_xy_m), square(seen.sigma_z_m);
-  covariance.bottomRightCorner<3, 3>() = square(seen.sigma_axis_rad) / 2 * across + square(seen.sigma_roll_rad) * along;
-  return message_of(seen.camera_from_marker, covariance);
+  return message_of(seen.camera_from_marker, seen.covariance);
 }
 
 FrameTopics::FrameTopics(Transport& transport, const Rig& rig, const FrameNames& names, bool rcm_moves)
@@ -83,11 +77,12 @@ FrameTopics::FrameTopics(Transport& transport, const Rig& rig, const FrameNames&
   for (const Instrument& instrument : rig.instruments) {
     const std::string& name = instrument.name;
     const std::string topics = "/lapservo/" + name + "/";
-    told_.push_back(
-        {instrument,
-         {names.camera, with_name(names.rcm, name), with_name(names.marker, name), with_name(names.shaft, name)},
-         transport.pose_publisher(topics + "pose"),
-         transport.cylinder_publisher(topics + "markers")});
+    told_.push_back({instrument,
+                     {names.camera, with_name(names.rcm, name), with_name(names.marker, name),
+                      with_name(names.shaft, name), with_name(names.tip, name)},
+                     transport.pose_publisher(topics + "pose"),
+                     instrument.tool ? transport.pose_publisher(topics + "tip_cp") : nullptr,
+                     transport.cylinder_publisher(topics + "markers")});
   }
   tell_rcms();
 }
@@ -127,6 +122,12 @@ void FrameTopics::publish(std::size_t index, const Observation& seen, const std:
     rcm_from_shaft.translation.setZero();
     if (rcm_moves_) frames.transforms.push_back({told.names.camera, told.names.rcm, *camera_from_rcm});
     frames.transforms.push_back({told.names.camera, told.names.shaft, *camera_from_rcm * rcm_from_shaft});
+  }
+  if (seen.tip && told.tip) {
+    PoseMessage tip = message_of(seen.tip->camera_from_tip, seen.tip->covariance);
+    tip.stamp_s = stamp_s, tip.frame = told.names.camera;
+    told.tip(tip);
+    frames.transforms.push_back({told.names.camera, told.names.tip, seen.tip->camera_from_tip});
   }
   moving_(frames);
   told.markers(

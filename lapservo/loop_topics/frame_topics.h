@@ -13,13 +13,14 @@ namespace lapservo::internal {
 
 /// Names of the frames in /tf; NAME in them stands for the instrument's.
 struct FrameNames {
-  std::string camera = "endoscope", rcm = "NAME_rcm", marker = "NAME_marker", shaft = "NAME_shaft";
+  std::string camera = "endoscope", rcm = "NAME_rcm", marker = "NAME_marker", shaft = "NAME_shaft", tip = "NAME_tip";
 };
 
 /// Where instruments are. At once and when it changes, /tf_static has the RCM frame in the camera frame; of every
 /// image, /tf has the marker frame and the shaft frame (origin at the RCM, turned by theta, phi and psi: z along the
 /// axis to the tip), /lapservo/NAME/pose the marker's with its covariance, /lapservo/NAME/markers its bands and the
-/// shaft from the RCM on as cylinders. Unknown ones are left out.
+/// shaft from the RCM on as cylinders, and of a tool's tip the frame and /lapservo/NAME/tip_cp, its pose with
+/// covariance. Unknown ones are left out.
 class FrameTopics {
  public:
   /// `rig`: all its instruments. `rcm_moves`: the RCM frame moves in the camera frame, and is in /tf of every image
@@ -36,7 +37,7 @@ class FrameTopics {
   struct Told {
     Instrument instrument;
     FrameNames names;
-    Transport::Publisher<PoseMessage> pose;
+    Transport::Publisher<PoseMessage> pose, tip;  ///< tip: null without a tool
     Transport::Publisher<CylindersMessage> markers;
   };
   void tell_rcms();
@@ -51,7 +52,7 @@ class FrameTopics {
 
 /// camera_from_marker of a configuration with its covariance from that of theta, phi, rho, psi.
 PoseMessage pose_message(const Instrument& instrument, const Observation::Rcm& seen);
-/// The same without camera_from_rcm, by the pose's own sigmas as if they were not correlated.
+/// The same without camera_from_rcm.
 PoseMessage pose_message(const Observation::MarkerPose& seen);
 
 }  // namespace lapservo::internal

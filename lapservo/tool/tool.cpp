@@ -7,25 +7,13 @@
 #include <fmt/format.h>
 
 #include "lapservo/core/error.h"
+#include "lapservo/tool/expect_wrist.h"
 
 namespace lapservo {
 namespace {
 
 using Covariance = TipInMarker::Covariance;
 using Motion = Eigen::Matrix<double, 6, 1>;
-
-void expect_usable(const Tool& tool, std::span<const double> wrist_rad) {
-  if (!tool.place) throw InputError("tool", "place", "missing", "where the tool sits behind the marker");
-  if (tool.wrist.size() > Tool::max_wrist_joints)
-    throw InputError("tool", "wrist", fmt::format("{} joints", tool.wrist.size()),
-                     fmt::format("at most {}", Tool::max_wrist_joints));
-  if (wrist_rad.size() != tool.wrist.size())
-    throw InputError("tool", "wrist_rad", fmt::format("{} readings", wrist_rad.size()),
-                     fmt::format("{}, one for each joint of the wrist", tool.wrist.size()));
-  for (std::size_t i = 0; i < wrist_rad.size(); ++i)
-    if (!std::isfinite(wrist_rad[i]))
-      throw InputError("tool", tool.wrist[i].name, fmt::format("{}", wrist_rad[i]), "a finite angle in radians");
-}
 
 Rigid3 turned_about_z(double angle_rad, const Eigen::Vector3d& translation) {
   return {Eigen::Quaterniond(Eigen::AngleAxisd(angle_rad, Eigen::Vector3d::UnitZ())), translation};
@@ -69,8 +57,21 @@ Covariance place_covariance(const Tool::PlaceCovariance& place, const Motion& by
 
 }  // namespace
 
+void internal::expect_wrist(const Tool& tool, std::span<const double> wrist_rad) {
+  if (wrist_rad.size() != tool.wrist.size())
+    throw InputError("tool", "wrist_rad", fmt::format("{} readings", wrist_rad.size()),
+                     fmt::format("{}, one for each joint of the wrist", tool.wrist.size()));
+  for (std::size_t i = 0; i < wrist_rad.size(); ++i)
+    if (!std::isfinite(wrist_rad[i]))
+      throw InputError("tool", tool.wrist[i].name, fmt::format("{}", wrist_rad[i]), "a finite angle in radians");
+}
+
 TipInMarker tip_in_marker(const Tool& tool, std::span<const double> wrist_rad) {
-  expect_usable(tool, wrist_rad);
+  if (!tool.place) throw InputError("tool", "place", "missing", "where the tool sits behind the marker");
+  if (tool.wrist.size() > Tool::max_wrist_joints)
+    throw InputError("tool", "wrist", fmt::format("{} joints", tool.wrist.size()),
+                     fmt::format("at most {}", Tool::max_wrist_joints));
+  internal::expect_wrist(tool, wrist_rad);
   const std::size_t count = wrist_rad.size();
   const Rigid3 marker_from_base = turned_about_z(tool.place->azimuth_rad, tool.place->base_in_marker_m);
   std::array<Rigid3, Tool::max_wrist_joints> marker_from_joint;

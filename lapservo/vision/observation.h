@@ -1,13 +1,16 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <optional>
+#include <span>
 #include <string>
 
 #include <Eigen/Core>
 
 #include "lapservo/kinematics/features.h"
 #include "lapservo/kinematics/rcm_kinematics.h"
+#include "lapservo/tool/tool.h"
 #include "lapservo/vision/status.h"
 
 namespace lapservo {
@@ -43,8 +46,22 @@ struct Observation {
     double sigma_z_m = 0;       ///< of its depth
     double sigma_axis_rad = 0;  ///< of the angle between the axis and the true one: root of both components' squares
     double sigma_roll_rad = 0;  ///< about the axis
+    /// Origin [m], then rotation vector [rad], in the camera's axes.
+    TipInMarker::Covariance covariance = TipInMarker::Covariance::Zero();
   };
   std::optional<MarkerPose> marker;
+
+  /// With MarkerPose, a tool whose place the rig says and, for a wrist, its joints' readings (Tracker::set_wrist()).
+  struct Tip {
+    Rigid3 camera_from_tip;
+    /// Position [m], then rotation vector [rad], in the camera's axes.
+    TipInMarker::Covariance covariance = TipInMarker::Covariance::Zero();
+    /// Parts of sigma_m(): by the shaft as it is seen, by the tool's place in the rig, by the readings of the wrist.
+    double sigma_shaft_m = 0, sigma_place_m = 0, sigma_readings_m = 0;
+    /// How far the true tip is: root of all three axes' variances.
+    double sigma_m() const { return std::sqrt(covariance.topLeftCorner<3, 3>().trace()); }
+  };
+  std::optional<Tip> tip;
 
   double tau_rad = 0;  ///< azimuth of the marker on the centre line, [0, 2 pi)
   double sigma_tau_rad = 0;
@@ -73,5 +90,10 @@ struct Observation {
   };
   Refused refused;
 };
+
+/// The tip behind the marker of an observation by readings of the wrist's joints, none for a straight tool: what
+/// Observation::tip is to be. Nullopt without a marker's pose, without the tool's place and without readings of its
+/// wrist. Throws InputError as tip_in_marker() does.
+std::optional<Observation::Tip> tip_of(const Observation& seen, const Tool& tool, std::span<const double> wrist_rad);
 
 }  // namespace lapservo

@@ -6,6 +6,7 @@
 #include "lapservo/core/error.h"
 #include "lapservo/core/words.h"
 #include "lapservo/rig/check_rig.h"
+#include "lapservo/tool/expect_wrist.h"
 #include "lapservo/vision/image/image_view.h"
 #include "lapservo/vision/image/interlacing.h"
 #include "lapservo/vision/paper/centerline.h"
@@ -71,6 +72,7 @@ struct Tracker::State {
         method(options.method),
         deinterlace(options.deinterlace || rig.camera.deinterlace),
         even_field(rig.camera.response),
+        wrists(rig.instruments.size()),
         surface(rig, options.single, options.frame_budget, options.max_p_false),
         centerline(rig) {}
 
@@ -82,6 +84,10 @@ struct Tracker::State {
   }
   void name_observations() {
     for (std::size_t i = 0; i < observations.size(); ++i) observations[i].instrument = rig.instruments[i].name;
+  }
+  void add_tips() {
+    for (std::size_t i = 0; i < observations.size(); ++i)
+      if (const auto& tool = rig.instruments[i].tool) observations[i].tip = tip_of(observations[i], *tool, wrists[i]);
   }
   // A frame between two moments is no observation of either, and nothing to start the next frame from.
   void refuse_combed(const cv::Mat& image_bgr) {
@@ -97,6 +103,7 @@ struct Tracker::State {
   Method method;
   bool deinterlace;
   EvenField even_field;
+  std::vector<std::vector<double>> wrists;
   SurfaceTracker surface;
   CenterlineMethod centerline;
   std::vector<Observation> observations;
@@ -117,6 +124,7 @@ const std::vector<Observation>& Tracker::track(const cv::Mat& image_bgr, std::op
     state_->refuse_combed(image_bgr);
   }
   state_->name_observations();
+  state_->add_tips();
   return state_->observations;
 }
 
@@ -132,6 +140,12 @@ void Tracker::set_registration(std::size_t instrument, const Rigid3& camera_from
   moved.registration_covariance = covariance;
   state_->surface.set_registration(instrument, moved);
   state_->centerline.set_registration(instrument, camera_from_rcm);
+}
+
+void Tracker::set_wrist(std::size_t instrument, std::span<const double> wrist_rad) {
+  const std::optional<Tool>& tool = state_->rig.instruments.at(instrument).tool;
+  if (!wrist_rad.empty()) expect_wrist(tool.value_or(Tool{}), wrist_rad);
+  state_->wrists[instrument].assign(wrist_rad.begin(), wrist_rad.end());
 }
 
 const std::vector<Observation>& Tracker::refuse(Status why) & {

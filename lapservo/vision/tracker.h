@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string_view>
 #include <vector>
 
@@ -62,6 +63,11 @@ class Tracker {
   /// frames before still count. Throws std::out_of_range for an instrument that the rig has not.
   void set_registration(std::size_t instrument, const Rigid3& camera_from_rcm,
                         const Eigen::Matrix<double, 6, 6>& covariance);
+
+  /// Readings of the joints of an instrument's wrist, in the order of its Tool::wrist [rad], in the frames to come,
+  /// until others are set; none: they are not known, and there is no tip. Throws InputError for another number of them
+  /// and for one that is not finite, std::out_of_range for an instrument that the rig has not.
+  void set_wrist(std::size_t instrument, std::span<const double> wrist_rad);
 
   /// For a frame whose pixels are not the camera's, as a damaged one's: one observation per instrument, of this status.
   /// Forgets the frame before.

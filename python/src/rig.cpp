@@ -180,12 +180,24 @@ q = sign * joints + offset, rad and m.)");
       .def_property_readonly(
           "image_delay_s", [](const Instrument& instrument) { return instrument.image_delay_s; },
           "a frame's stamp minus the joints' clock at its exposure, or None")
+      .def_property_readonly(
+          "wrist_joints",
+          [](const Instrument& instrument) {
+            std::vector<std::string> names;
+            if (instrument.tool)
+              for (const WristJoint& joint : instrument.tool->wrist) names.push_back(joint.name);
+            return names;
+          },
+          "list[str]: the joints of the tool's wrist, in the order of Tracker.set_wrist; empty for a straight tool")
       .def("__repr__", [](const Instrument& instrument) { return "<lapservo.Instrument '" + instrument.name + "'>"; });
 }
 
 // Who uses it may stand in another folder by then.
-Rig with_absolute_camera_file(Rig rig) {
+Rig with_absolute_files(Rig rig) {
   if (!rig.camera_file.empty()) rig.camera_file = std::filesystem::absolute(rig.camera_file);
+  for (Instrument& instrument : rig.instruments)
+    if (instrument.tool && !instrument.tool->file.empty())
+      instrument.tool->file = std::filesystem::absolute(instrument.tool->file);
   return rig;
 }
 
@@ -199,6 +211,8 @@ void bind_rig(py::module_& m) {
 The bands run from proximal to distal; tau is the azimuth on the marker from its seam, right-handed about the axis
 towards the tip.)");
   bind_state(marker);
+  py::class_<WristJoint> wrist_joint(m, "_WristJoint", "A joint of a wrist, for pickles.");
+  bind_state(wrist_joint);
   bind_instrument(m);
   py::class_<Rig, std::shared_ptr<Rig>> type(m, "Rig", R"(What stands before which camera.
 
@@ -211,12 +225,12 @@ with the field, its value and what was expected.)");
            }),
            py::arg("camera"), py::arg("instruments"))
       .def_static(
-          "load", [](const std::filesystem::path& path) { return with_absolute_camera_file(load_rig(path)); },
+          "load", [](const std::filesystem::path& path) { return with_absolute_files(load_rig(path)); },
           py::arg("path"), "Reads a rig's YAML file.")
       .def_static(
           "parse",
           [](const std::string& yaml, const std::filesystem::path& folder) {
-            return with_absolute_camera_file(parse_rig(yaml, "rig", folder));
+            return with_absolute_files(parse_rig(yaml, "rig", folder));
           },
           py::arg("yaml"), py::arg("folder") = ".",
           "The same from text; `folder` is where a camera file is looked for.")

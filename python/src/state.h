@@ -46,9 +46,18 @@ inline auto members(Marker& v) {
 inline auto members(Joints& v) {
   return std::tie(v.names, v.sign, v.offset, v.sigma_offset);
 }
+inline auto members(WristJoint& v) {
+  return std::tie(v.name, v.alpha_rad, v.a_m, v.theta_rad, v.d_m, v.offset_rad, v.sigma_reading_rad);
+}
+inline auto members(Tool::Place& v) {
+  return std::tie(v.base_in_marker_m, v.azimuth_rad, v.covariance);
+}
+inline auto members(Tool& v) {
+  return std::tie(v.wrist, v.last_from_tip, v.snake_like, v.place, v.file);
+}
 inline auto members(Instrument& v) {
   return std::tie(v.name, v.marker, v.camera_from_rcm, v.joints, v.image_delay_s, v.sigma_translation_m,
-                  v.sigma_quaternion_xyzw, v.registration_covariance, v.sigma_image_delay_s);
+                  v.sigma_quaternion_xyzw, v.registration_covariance, v.sigma_image_delay_s, v.tool);
 }
 inline auto members(Rig& v) {
   return std::tie(v.camera, v.instruments, v.camera_file);
@@ -57,7 +66,10 @@ inline auto members(Observation::Rcm& v) {
   return std::tie(v.q, v.covariance);
 }
 inline auto members(Observation::MarkerPose& v) {
-  return std::tie(v.camera_from_marker, v.sigma_xy_m, v.sigma_z_m, v.sigma_axis_rad, v.sigma_roll_rad);
+  return std::tie(v.camera_from_marker, v.sigma_xy_m, v.sigma_z_m, v.sigma_axis_rad, v.sigma_roll_rad, v.covariance);
+}
+inline auto members(Observation::Tip& v) {
+  return std::tie(v.camera_from_tip, v.covariance, v.sigma_shaft_m, v.sigma_place_m, v.sigma_readings_m);
 }
 inline auto members(Observation::Refused& v) {
   return std::tie(v.what, v.camera_from_unrolled, v.psi_rad, v.edges_raw_px);
@@ -67,7 +79,7 @@ inline auto members(Features& v) {
 }
 inline auto members(Observation& v) {
   return std::tie(v.status, v.instrument, v.rcm, v.marker, v.tau_rad, v.sigma_tau_rad, v.edges_ideal_px, v.edges_raw_px,
-                  v.edges_covariance_px2, v.features, v.camera_from_unrolled, v.psi_rad, v.p_false, v.refused);
+                  v.edges_covariance_px2, v.features, v.camera_from_unrolled, v.psi_rad, v.p_false, v.refused, v.tip);
 }
 inline auto members(Frame& v) {
   return std::tie(v.bgr, v.index, v.time_s, v.file, v.flaw);

@@ -128,9 +128,28 @@ Origin at the marker's proximal end on the axis, z along the axis to the tip, x 
       .def_readonly("sigma_z_m", &Pose::sigma_z_m, "of its depth")
       .def_readonly("sigma_axis_rad", &Pose::sigma_axis_rad, "of the angle between the axis and the true one")
       .def_readonly("sigma_roll_rad", &Pose::sigma_roll_rad, "about the axis")
+      .def_readonly("covariance", &Pose::covariance,
+                    "float[6, 6]: of the origin [m] and a rotation vector [rad], in the camera's axes")
       .def("__repr__", [](const Pose& pose) {
         const Eigen::Vector3d& at = pose.camera_from_marker.translation;
         return fmt::format("<lapservo.MarkerPose at {:.5f}, {:.5f}, {:.5f} m>", at.x(), at.y(), at.z());
+      });
+
+  using Tip = Observation::Tip;
+  py::class_<Tip> tip_type(m, "TipPose", "The pose of the tip behind the marker, by the rig's tool.");
+  bind_state(tip_type);
+  tip_type
+      .def_property_readonly(
+          "camera_from_tip", [](const Tip& tip) { return matrix_of(tip.camera_from_tip); }, "float[4, 4], metres")
+      .def_readonly("covariance", &Tip::covariance,
+                    "float[6, 6]: of the position [m] and a rotation vector [rad], in the camera's axes")
+      .def_property_readonly("sigma_m", &Tip::sigma_m, "of the distance from the true tip; its parts:")
+      .def_readonly("sigma_shaft_m", &Tip::sigma_shaft_m, "by the shaft as it is seen")
+      .def_readonly("sigma_place_m", &Tip::sigma_place_m, "by the tool's place in the rig")
+      .def_readonly("sigma_readings_m", &Tip::sigma_readings_m, "by the readings of the wrist's joints")
+      .def("__repr__", [](const Tip& tip) {
+        const Eigen::Vector3d& at = tip.camera_from_tip.translation;
+        return fmt::format("<lapservo.TipPose at {:.5f}, {:.5f}, {:.5f} m>", at.x(), at.y(), at.z());
       });
 
   py::class_<Observed>(m, "Observation", R"(The measurement of one instrument in one frame.
@@ -179,6 +198,9 @@ Sigmas are one standard deviation. Of an observation whose status is not ok, eve
       .def_property_readonly(
           "marker_pose", [](const Observed& seen) { return is_ok(seen) ? seen.observation.marker : std::nullopt; },
           "MarkerPose; None by method 'centerline'")
+      .def_property_readonly(
+          "tip", [](const Observed& seen) { return is_ok(seen) ? seen.observation.tip : std::nullopt; },
+          "TipPose; None where the rig has no tool, or no place of it, or its wrist's readings are not set")
       .def("overlay", &overlay, py::arg("image"),
            "The frame with what was seen drawn in, as a new uint8[H, W, 3]; what was refused in dashes.")
       .def(py::pickle(&state_of_observed, &observed_from))
@@ -214,6 +236,12 @@ class SafeTracker {
     const std::lock_guard lock(mutex_);
     return observed(frame.flaw ? tracker_.refuse(*frame.flaw) : tracker_.track(frame.bgr, frame.time_s), rig_,
                     frame.time_s);
+  }
+  void set_wrist(const std::string& instrument, const std::vector<double>& wrist_rad) {
+    const auto index = internal::instrument_index(*rig_, instrument);
+    if (!index) throw InputError("set_wrist", "instrument", instrument, "an instrument of the rig");
+    const std::lock_guard lock(mutex_);
+    tracker_.set_wrist(*index, wrist_rad);
   }
   void reset() {
     const py::gil_scoped_release others_run;
@@ -314,6 +342,9 @@ Holds what it learnt from the frame before. Threads may share it; frames are the
            R"(list[Observation], one per instrument, of uint8[H, W, 3] in blue green red, of the rig's size.
 
 The image is not copied; other Python threads run meanwhile.)")
+      .def(
+          "set_wrist", &SafeTracker::set_wrist, py::arg("instrument"), py::arg("wrist_rad"),
+          "Readings [rad] of an instrument's wrist_joints in the frames to come; an empty list where they are unknown.")
       .def("reset", &SafeTracker::reset, "Forgets the frame before: the next one is searched anew.");
 }
 

@@ -25,10 +25,31 @@ def test_a_rendered_instrument_is_where_it_was_put(rig, image):
     assert seen.features_covariance.shape == (4, 4) and np.all(np.linalg.eigvalsh(seen.features_covariance) > 0)
 
 
+def test_the_tip_follows_the_wrist(rig, image):
+    wrist = ("    tool: {joints: [{name: wrist_pitch, alpha_rad: -1.570796326795}], tip_in_last_joint_m: [0.01, 0, 0], "
+             "wrist_in_marker_m: [0, 0, 0.03], azimuth_rad: 0}\n")
+    wristed = lapservo.Rig.parse(rig.to_yaml() + wrist)
+    assert wristed.instruments[0].wrist_joints == ["wrist_pitch"] and rig.instruments[0].wrist_joints == []
+    tracker = lapservo.Tracker(wristed)
+    assert tracker.track(image)[0].tip is None
+    tracker.set_wrist("PSM1", [-np.pi / 2])
+    seen = tracker.track(image)[0]
+    tip = seen.tip
+    assert np.allclose(tip.camera_from_tip[:3, 3], (seen.marker_pose.camera_from_marker @ [0, 0, 0.04, 1])[:3])
+    assert np.all(np.linalg.eigvalsh(tip.covariance) > 0) and np.isclose(tip.sigma_m**2, np.trace(tip.covariance[:3, :3]))
+    assert np.isclose(tip.sigma_readings_m, 0.01 * np.pi / 180) and tip.sigma_place_m == 0 < tip.sigma_shaft_m
+    assert pickle.loads(pickle.dumps(seen)) == seen and pickle.loads(pickle.dumps(wristed)) == wristed
+    for readings in ([1.0, 2.0], [np.nan]):
+        with pytest.raises(lapservo.InputError):
+            tracker.set_wrist("PSM1", readings)
+    with pytest.raises(lapservo.InputError, match="PSM9"):
+        tracker.set_wrist("PSM9", [0.0])
+
+
 def test_without_a_marker_every_number_is_none(rig):
     seen = lapservo.Tracker(rig).track(np.full((720, 1280, 3), 90, np.uint8))[0]
     assert not seen.ok and seen.status is lapservo.Status.no_marker
-    for name in "q q_covariance features cross_ratio tau_rad sigma_tau_rad edges_px marker_pose stamp_s".split():
+    for name in "q q_covariance features cross_ratio tau_rad sigma_tau_rad edges_px marker_pose tip stamp_s".split():
         assert getattr(seen, name) is None, name
 
 

@@ -1,3 +1,5 @@
+#include <algorithm>
+#include <array>
 #include <cstdio>
 #include <cstdlib>
 #include <future>
@@ -6,8 +8,10 @@
 #include <string>
 #include <unistd.h>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "apps/lapservo/cli/interrupt.h"
 #include "apps/lapservo/cli/progress.h"
@@ -20,6 +24,7 @@
 #include "lapservo/calibration/check/rig_check.h"
 #include "lapservo/calibration/check/work_space.h"
 #include "lapservo/calibration/colour/colour_calibration.h"
+#include "lapservo/core/statistics.h"
 #include "lapservo/io/frame_source.h"
 #include "lapservo/rig/registration_covariance.h"
 
@@ -37,6 +42,32 @@ void print(const CheckedRig& checked) {
   for (const Advice& advice : checked.advice)
     std::printf("  %d. %s%s\n     do: %s\n     gains: %s\n", ++rank, advice.needed ? "" : "(may be) ",
                 advice.what.c_str(), advice.command.c_str(), advice.gain.c_str());
+}
+
+// Medians over the frames, the largest part first.
+std::string tip_text(const Instrument& instrument, const std::vector<FrameEvidence>& frames,
+                     const std::optional<JointInput>& wrist) {
+  std::vector<double> whole_mm;
+  std::array<std::pair<std::vector<double>, const char*>, 3> parts{
+      {{{}, "the shaft"}, {{}, "the marker's place"}, {{}, "the wrist's joints"}}};
+  for (const FrameEvidence& frame : frames) {
+    Observation seen;
+    seen.status = frame.status, seen.marker = frame.marker;
+    const auto tip = tip_of(seen, *instrument.tool, wrist_at(wrist, instrument, frame.time_s));
+    if (!tip) continue;
+    whole_mm.push_back(1e3 * tip->sigma_m());
+    parts[0].first.push_back(1e3 * tip->sigma_shaft_m), parts[1].first.push_back(1e3 * tip->sigma_place_m);
+    parts[2].first.push_back(1e3 * tip->sigma_readings_m);
+  }
+  const std::string why = no_tip_text(instrument, wrist.has_value());
+  if (whole_mm.empty()) return "unknown: " + (why.empty() ? "no frame has the marker and readings" : why);
+  std::vector<std::pair<double, const char*>> sizes_mm;
+  for (auto& [all_mm, from] : parts)
+    if (const double size_mm = median(all_mm); size_mm > 0) sizes_mm.emplace_back(size_mm, from);
+  std::sort(sizes_mm.rbegin(), sizes_mm.rend());
+  std::vector<std::string> texts;
+  for (const auto& [size_mm, from] : sizes_mm) texts.push_back(fmt::format("{:.2g} from {}", size_mm, from));
+  return fmt::format("known to {:.2g} mm: {}", median(whole_mm), fmt::join(texts, ", "));
 }
 
 }  // namespace
@@ -94,6 +125,10 @@ int check(const CalibrateOptions& options) {
     if (print.valid()) checked.findings.print = print.get();
   }
   checked.advice = advice_on(checked.findings);
+  if (instrument.tool)
+    checked.tip =
+        tip_text(instrument, checked.frames,
+                 find_wrist_input(options.input, options.joints, options.joint_topic, instrument, source.get()));
   checked.exact_registration = exact_registration_text(instrument);
   std::printf("%s\n", instrument.name.c_str());
   print(checked);

@@ -246,6 +246,7 @@ std::vector<CheckLine> check_lines(const CheckedRig& checked) {
   const auto more = f.arm ? arm_lines(*f.arm) : f.rcm ? rcm_lines(*f.rcm) : std::vector<CheckLine>{};
   lines.insert(lines.end(), more.begin(), more.end());
   if (!checked.exact_registration.empty()) lines.push_back({"standard deviations", checked.exact_registration});
+  if (!checked.tip.empty()) lines.push_back({"tip", checked.tip});
   if (f.work_space)
     lines.push_back(
         {"work space", fmt::format("sigma of psi at most {:.0f} mrad in {:.0f} % of {} places, up to {:.1f}",

@@ -18,6 +18,7 @@ struct CheckedRig {
   std::vector<internal::SigmaMap> maps;
   std::vector<internal::Advice> advice;
   std::string exact_registration;  ///< exact_registration_text()
+  std::string tip;                 ///< how well it is known, or why not; empty without a tool
   /// A frame of each kind with the pixels that have a band's hue painted (segmentation_picture); empty without such a
   /// frame.
   cv::Mat found_segmented, missed_segmented;

@@ -20,7 +20,9 @@
 #include "apps/lapservo/cli/web_view.h"
 #include "apps/lapservo/inputs/frame_input.h"
 #include "apps/lapservo/inputs/input_files.h"
+#include "apps/lapservo/inputs/joint_input.h"
 #include "apps/lapservo/inputs/live_frames.h"
+#include "apps/lapservo/inputs/live_wrist.h"
 #include "apps/lapservo/inputs/transports.h"
 #include "lapservo/calibration/check/frame_diagnosis.h"
 #include "lapservo/calibration/check/usual_cause.h"
@@ -44,7 +46,7 @@ namespace fs = std::filesystem;
 
 struct TrackOptions : FrameOptions {
   std::string input, rig, out = "obs.csv", overlay;
-  std::string method = "surface", publish, tf_frames = default_frames;
+  std::string method = "surface", publish, tf_frames = default_frames, joints, joint_topic;
   bool single = false;
   WebOptions web;
   bool page_only = false;  ///< `lapservo view`: at the input's own pace, and without --out
@@ -55,7 +57,7 @@ struct TrackOptions : FrameOptions {
 InputFiles inputs_of(const TrackOptions& options) {
   InputFiles inputs;
   std::error_code error;
-  inputs.add(options.input);
+  inputs.add(options.input), inputs.add(options.joints);
   if (fs::is_directory(options.input, error)) inputs.add_pictures_in(options.input);
   return inputs;
 }
@@ -229,6 +231,7 @@ class TrackRun {
         source_(live_ ? static_cast<FrameSource&>(*live_) : *file_) {
     if (source_.kind() == FrameSource::Kind::image || source_.kind() == FrameSource::Kind::folder)
       rigs_.expect_pictures();
+    if (names_topic(options.joints)) live_wrist_.emplace(options.joints);
     if (!options.publish.empty()) publishing_.emplace(options);
     if (options.web.port) web_.emplace(options.web, page_config_of(options, source_));
     if (!options.page_only) csv_.emplace(options.out);
@@ -268,6 +271,7 @@ class TrackRun {
       const double came_s = clock_.now_s() - (live_ ? live_->age_s() : 0);
       Tracker& tracker = rigs_.tracker_for(*frame);
       try {
+        set_wrists(tracker, *frame);
         const auto& observations =
             frame->flaw ? tracker.refuse(*frame->flaw) : tracker.track(frame->bgr, frame->time_s);
         tally_.add(observations);
@@ -281,6 +285,26 @@ class TrackRun {
       progress.show(tally_.frames, tally_.text());
       const double next_s = begin_s_ + frame->time_s + 1 / source_.frames_per_second();
       if (plays_a_file()) wait_on_page(*web_, [this, next_s] { return clock_.now_s() >= next_s; });
+    }
+  }
+
+  // Readings of the wrists at the frame's time. Once a rig, the reason why an instrument has no tip.
+  void set_wrists(Tracker& tracker, const Frame& frame) {
+    const std::vector<Instrument>& instruments = rigs_.rig()->instruments;
+    const bool is_new = std::exchange(wrists_of_, rigs_.rig()) != rigs_.rig();
+    if (is_new) wrists_.clear();
+    for (std::size_t i = 0; i < instruments.size(); ++i) {
+      const Instrument& instrument = instruments[i];
+      if (is_new) {
+        wrists_.push_back(live_wrist_ ? std::nullopt
+                                      : find_wrist_input(options_.input, options_.joints, options_.joint_topic,
+                                                         instrument, &source_));
+        if (const std::string why = no_tip_text(instrument, live_wrist_ || wrists_[i]); !why.empty())
+          std::fprintf(stderr, "lapservo: %s: no tip: %s\n", instrument.name.c_str(), why.c_str());
+      }
+      if (!instrument.tool) continue;
+      tracker.set_wrist(
+          i, live_wrist_ ? live_wrist_->newest(*instrument.tool) : wrist_at(wrists_[i], instrument, frame.time_s));
     }
   }
 
@@ -338,6 +362,9 @@ class TrackRun {
   std::optional<WebView> web_;
   std::optional<ObservationCsv> csv_;
   std::unique_ptr<OverlayWriter> overlay_;
+  std::optional<LiveWrist> live_wrist_;
+  std::shared_ptr<const Rig> wrists_of_;
+  std::vector<std::optional<JointInput>> wrists_;  // an instrument, by that rig
   SteadyClock clock_;
   double begin_s_ = 0;
   Tally tally_;
@@ -365,6 +392,10 @@ void add_input_options(Command command, TrackOptions& options) {
   add_video_options(command, options);
   command.add_option("--rig", options.rig,
                      "Camera and instruments; without it NAME.rig.yaml or rig.yaml beside the input");
+  command.add_option("--joints", options.joints,
+                     "Readings of a tool's wrist, for the tip: a CSV (time_s and a column a joint), a bag, or a topic "
+                     "(ros2:/PSM1/measured_js); without it those in the input, where it is a bag");
+  add_joint_topic_option(command, options.joint_topic);
   command.add_option("--method", options.method, "surface: all visible lines; centerline: the paper's Algorithm 1")
       .one_of({"surface", "centerline"});
   command.add_flag("--single", options.single, "Treat every frame on its own, without tracking from the frame before");

@@ -1,8 +1,14 @@
 #include "apps/lapservo/inputs/joint_input.h"
 
+#include <algorithm>
+#include <array>
+#include <cstddef>
 #include <memory>
 #include <utility>
 #include <vector>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "apps/lapservo/inputs/frame_input.h"
 #include "lapservo/core/csv.h"
@@ -43,7 +49,58 @@ JointInput read_topic(const CalibrateOptions& options, const Instrument& instrum
   return reported({joints, joints_in_bag(bag, topic, joints, begin_s), bag.path()});
 }
 
+std::optional<JointInput> read_wrist_topic(const std::string& path, const std::string& joint_topic,
+                                           const Instrument& instrument, const FrameSource* frames) {
+  const auto bag = open_bag(path);
+  const BagTopic* topic = joint_topic_of(*bag, joint_topic, instrument.name);
+  const auto joints = topic ? wrist_joints(*instrument.tool, joint_names_in_bag(*bag, *topic)) : std::nullopt;
+  if (!joints) return std::nullopt;
+  return JointInput{*joints, joints_in_bag(*bag, *topic, *joints, frames ? frames->first_stamp_s() : std::nullopt),
+                    path};
+}
+
 }  // namespace
+
+std::optional<Joints> wrist_joints(const Tool& tool, const std::vector<std::string>& recorded) {
+  Joints joints;
+  for (std::size_t i = 0; i < joints.names.size(); ++i) {
+    const std::string& name = tool.wrist[i % tool.wrist.size()].name;
+    const std::array<std::string, 2> names{name, "outer_" + name};
+    const auto found = std::find_first_of(recorded.begin(), recorded.end(), names.begin(), names.end());
+    if (found == recorded.end()) return std::nullopt;
+    joints.names[i] = *found;
+  }
+  return joints;
+}
+
+std::optional<JointInput> find_wrist_input(const std::string& input, const std::string& joints,
+                                           const std::string& joint_topic, const Instrument& instrument,
+                                           const FrameSource* frames) {
+  if (!instrument.tool || instrument.tool->wrist.empty()) return std::nullopt;
+  const std::string& source = joints.empty() ? input : joints;
+  if (const std::string bag = bag_of(source); !bag.empty())
+    return read_wrist_topic(bag, joint_topic, instrument, frames);
+  const auto named = joints.empty() ? std::nullopt : wrist_joints(*instrument.tool, columns_of(joints));
+  if (!named) return std::nullopt;
+  return JointInput{*named, read_joint_recording(joints, *named), joints};
+}
+
+std::vector<double> wrist_at(const std::optional<JointInput>& wrist, const Instrument& instrument, double frame_s) {
+  const auto joints = wrist ? wrist->recording.at(frame_s - instrument.image_delay_s.value_or(0)) : std::nullopt;
+  if (!joints) return {};
+  return {joints->begin(), joints->begin() + static_cast<std::ptrdiff_t>(instrument.tool->wrist.size())};
+}
+
+std::string no_tip_text(const Instrument& instrument, bool wrist_is_read) {
+  if (!instrument.tool) return "";
+  if (!instrument.tool->place)
+    return "the rig does not say where the tool sits behind the marker: lapservo calibrate tip measures it";
+  if (instrument.tool->wrist.empty() || wrist_is_read) return "";
+  std::vector<std::string> names;
+  for (const WristJoint& joint : instrument.tool->wrist) names.push_back(joint.name);
+  return fmt::format("no readings of the wrist's joints {}: --joints names a recording or topic that has them",
+                     fmt::join(names, ", "));
+}
 
 void add_joint_options(Command command, CalibrateOptions& options, const std::string& help) {
   command.add_option("--joints", options.joints, help);

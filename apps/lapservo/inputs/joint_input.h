@@ -2,6 +2,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "apps/lapservo/commands/calibrate/calibrate_inputs.h"
 #include "lapservo/calibration/recording/joint_recording.h"
@@ -26,5 +27,18 @@ JointInput read_joint_input(const CalibrateOptions& options, const Instrument& i
 /// The same, and without --joints of the input itself where it is a bag; nullopt without any.
 std::optional<JointInput> find_joint_input(const CalibrateOptions& options, const Instrument& instrument,
                                            const FrameSource* frames);
+
+/// A wrist's joints by the names that they are recorded with, also those of dVRK before 2.3, repeated up to four;
+/// nullopt where one is missing.
+std::optional<Joints> wrist_joints(const Tool& tool, const std::vector<std::string>& recorded);
+
+/// The readings of these during the frames. `joints`: of --joints, else `input`, where it is a bag. Nullopt without.
+std::optional<JointInput> find_wrist_input(const std::string& input, const std::string& joints,
+                                           const std::string& joint_topic, const Instrument& instrument,
+                                           const FrameSource* frames);
+/// At a frame's stamp, in the order of Tool::wrist; empty where they are not known.
+std::vector<double> wrist_at(const std::optional<JointInput>& wrist, const Instrument& instrument, double frame_s);
+/// Why an instrument's tip is not known, with the remedy; empty where it is, and without a tool.
+std::string no_tip_text(const Instrument& instrument, bool wrist_is_read);
 
 }  // namespace lapservo::app

@@ -65,20 +65,22 @@ std::unique_ptr<Transport> make_transport(const std::string& transport, [[maybe_
 
 void add_frame_names_option(Command command, std::string& frames) {
   command.add_option("--tf-frames", frames,
-                     "Names in /tf of the frames of camera, RCM, marker and shaft; NAME stands for the instrument's");
+                     "Names in /tf of the frames of camera, RCM, marker, shaft and, where it is not NAME_tip, tip; "
+                     "NAME stands for the instrument's");
 }
 
 FrameNames frame_names_of(const std::string& frames) {
   std::istringstream text(frames + ",");
   std::vector<std::string> names;
   for (std::string name; std::getline(text, name, ',');) names.push_back(name);
+  if (names.size() == 4) names.push_back(FrameNames().tip);  // as before tools had frames
   const std::set<std::string> distinct(names.begin(), names.end());
-  if (names.size() != 4 || distinct.size() != 4 || distinct.contains("") ||
+  if (names.size() != 5 || distinct.size() != 5 || distinct.contains("") ||
       frames.find_first_of(" /\t\n") != std::string::npos)
-    throw InputError(
-        "--tf-frames",
-        "is " + printable(frames) + ", expected four names: camera, RCM, marker, shaft, without blanks and slashes");
-  return {names[0], names[1], names[2], names[3]};
+    throw InputError("--tf-frames",
+                     "is " + printable(frames) +
+                         ", expected four or five names: camera, RCM, marker, shaft, tip, without blanks and slashes");
+  return {names[0], names[1], names[2], names[3], names[4]};
 }
 
 void add_setpoint_readers_option(Command command, int& setpoint_readers) {

@@ -26,7 +26,7 @@ std::unique_ptr<internal::Transport> make_transport(const std::string& transport
 constexpr auto default_frames = "endoscope,NAME_rcm,NAME_marker,NAME_shaft";
 /// --tf-frames of the commands that publish frames.
 void add_frame_names_option(Command command, std::string& frames);
-/// Throws InputError for what are not four names.
+/// Throws InputError for what are not four or five names.
 internal::FrameNames frame_names_of(const std::string& frames);
 
 /// --setpoint-readers of the commands that move an arm.

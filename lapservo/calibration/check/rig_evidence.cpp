@@ -84,7 +84,7 @@ bool RigEvidence::look_with(FreeTrackers& trackers, const cv::Mat& bgr, double t
 
 FrameEvidence RigEvidence::tracked_as_it_is(const cv::Mat& bgr, double time_s) {
   const Observation& seen = as_it_is_.track(bgr)[instrument_];
-  FrameEvidence frame{time_s, seen.status, seen.marker ? seen.marker->sigma_roll_rad : 0, {}, {}, 0};
+  FrameEvidence frame{time_s, seen.status, seen.marker ? seen.marker->sigma_roll_rad : 0, seen.marker, {}, {}, 0};
   if (seen.status == Status::ok && seen.rcm) frame.psi_rad = seen.rcm->q.psi_rad;
   return frame;
 }

@@ -24,10 +24,11 @@ namespace lapservo::internal {
 struct FrameEvidence {
   double time_s;
   Status status;
-  double sigma_roll_rad = 0;         ///< when ok: about the axis, in a fit as it is tracked
-  std::optional<double> psi_rad{};   ///< when ok and the rig has camera_from_rcm
-  std::optional<MarkerLight> light;  ///< where the marker was found, be its print the rig's or not
-  double width_px = 0;               ///< of the shaft, there
+  double sigma_roll_rad = 0;                        ///< when ok: about the axis, in a fit as it is tracked
+  std::optional<Observation::MarkerPose> marker{};  ///< when ok
+  std::optional<double> psi_rad{};                  ///< when ok and the rig has camera_from_rcm
+  std::optional<MarkerLight> light;                 ///< where the marker was found, be its print the rig's or not
+  double width_px = 0;                              ///< of the shaft, there
 };
 
 /// Passes a recording's frames through all measurements that test the rig.

@@ -50,7 +50,8 @@ const char* const observation_csv_header =
     "e0_u_px,e0_v_px,e1_u_px,e1_v_px,e2_u_px,e2_v_px,e3_u_px,e3_v_px,"
     "s_rad,r_px,l_px,d_px,cross_ratio,"
     "marker_x_m,marker_y_m,marker_z_m,marker_qx,marker_qy,marker_qz,marker_qw,"
-    "sigma_marker_xy_m,sigma_marker_z_m,sigma_axis_rad,sigma_roll_rad,p_false";
+    "sigma_marker_xy_m,sigma_marker_z_m,sigma_axis_rad,sigma_roll_rad,p_false,"
+    "tip_x_m,tip_y_m,tip_z_m,sigma_tip_x_m,sigma_tip_y_m,sigma_tip_z_m";
 
 std::vector<ObservationNumber> observation_numbers(const Observation& observation) {
   Numbers numbers(observation);
@@ -73,6 +74,13 @@ std::vector<ObservationNumber> observation_numbers(const Observation& observatio
   numbers.add(f.cross_ratio, 7);
   add_marker(numbers, observation.marker);
   numbers.add_sigma(rcm ? observation.p_false : std::nullopt);
+  const auto of_tip = [&](auto get) {
+    return observation.tip ? std::optional<double>(get(*observation.tip)) : std::nullopt;
+  };
+  for (Eigen::Index i = 0; i < 3; ++i)
+    numbers.add(of_tip([&](const auto& tip) { return tip.camera_from_tip.translation[i]; }), 8);
+  for (Eigen::Index i = 0; i < 3; ++i)
+    numbers.add_sigma(of_tip([&](const auto& tip) { return std::sqrt(tip.covariance(i, i)); }));
   return std::move(numbers).all();
 }
 

@@ -35,6 +35,10 @@ Observation random_observation(Random& random) {
   o.marker->sigma_xy_m = 1e-5, o.marker->sigma_z_m = 2e-4, o.marker->sigma_axis_rad = 3e-4;
   o.marker->sigma_roll_rad = 4e-4;
   o.p_false = 5e-5;
+  o.tip = Observation::Tip{};
+  Observation::Tip& tip = *o.tip;
+  tip.camera_from_tip.translation = {random.uniform(-0.1, 0.1), random.uniform(-0.1, 0.1), random.uniform(0.05, 0.2)};
+  for (Eigen::Index i = 0; i < 3; ++i) tip.covariance(i, i) = std::pow(10.0, random.uniform(-10, -6));
   o.tau_rad = random.uniform(0, two_pi);
   o.sigma_tau_rad = std::pow(10.0, random.uniform(-6, -2));
   for (std::size_t k = 0; k < 4; ++k) {
@@ -65,7 +69,8 @@ TEST(ObservationCsv, HasTheColumnsOfTheConventions) {
             "e0_u_px,e0_v_px,e1_u_px,e1_v_px,e2_u_px,e2_v_px,e3_u_px,e3_v_px,"
             "s_rad,r_px,l_px,d_px,cross_ratio,"
             "marker_x_m,marker_y_m,marker_z_m,marker_qx,marker_qy,marker_qz,marker_qw,"
-            "sigma_marker_xy_m,sigma_marker_z_m,sigma_axis_rad,sigma_roll_rad,p_false");
+            "sigma_marker_xy_m,sigma_marker_z_m,sigma_axis_rad,sigma_roll_rad,p_false,"
+            "tip_x_m,tip_y_m,tip_z_m,sigma_tip_x_m,sigma_tip_y_m,sigma_tip_z_m");
 }
 
 TEST(ObservationCsv, NumbersComeBackFarFinerThanTheyAreKnown) {
@@ -89,8 +94,8 @@ TEST(ObservationCsv, NumbersComeBackFarFinerThanTheyAreKnown) {
     }
     expect("tau_rad", o.tau_rad, 1e-7), expect("sigma_tau_rad", o.sigma_tau_rad, 1e-3 * o.sigma_tau_rad);
     for (std::size_t k = 0; k < 4; ++k) {  // raw pixels, for drawing
-      expect("e" + std::to_string(k) + "_u_px", o.edges_raw_px[k].x(), 1e-4);
-      expect("e" + std::to_string(k) + "_v_px", o.edges_raw_px[k].y(), 1e-4);
+      const std::string edge = std::string("e").append(std::to_string(k));
+      expect(edge + "_u_px", o.edges_raw_px[k].x(), 1e-4), expect(edge + "_v_px", o.edges_raw_px[k].y(), 1e-4);
     }
     expect("s_rad", o.features.s_rad, 1e-7), expect("r_px", o.features.r_px.value(), 1e-4);
     expect("l_px", o.features.l_px, 1e-4), expect("d_px", o.features.d_px, 1e-4);
@@ -101,6 +106,9 @@ TEST(ObservationCsv, NumbersComeBackFarFinerThanTheyAreKnown) {
     expect("sigma_marker_xy_m", 1e-5, 1e-8), expect("sigma_marker_z_m", 2e-4, 1e-7);
     expect("sigma_axis_rad", 3e-4, 1e-7), expect("sigma_roll_rad", 4e-4, 1e-7);
     expect("p_false", 5e-5, 1e-8);
+    expect("tip_x_m", o.tip->camera_from_tip.translation.x(), 1e-8);
+    const double sigma_tip_m = std::sqrt(o.tip->covariance(2, 2));
+    expect("sigma_tip_z_m", sigma_tip_m, 1e-3 * sigma_tip_m);
   }
 }
 
@@ -127,6 +135,14 @@ TEST(ObservationCsv, WithoutAPoseTheMarkersColumnsAreEmpty) {
   EXPECT_EQ(empty_columns(table_of(o)).size(), 11U);
 }
 
+TEST(ObservationCsv, WithoutATipItsColumnsAreEmpty) {
+  Random random(seed);
+  Observation o = random_observation(random);
+  o.tip.reset();
+  EXPECT_EQ(empty_columns(table_of(o)), (std::vector<std::string>{"tip_x_m", "tip_y_m", "tip_z_m", "sigma_tip_x_m",
+                                                                  "sigma_tip_y_m", "sigma_tip_z_m"}));
+}
+
 TEST(ObservationCsv, WithoutAnObservationEveryMeasurementIsEmpty) {
   Random random(seed);
   for (const Status status : {Status::no_marker, Status::cut, Status::occluded, Status::ambiguous, Status::poor_fit,
@@ -136,7 +152,7 @@ TEST(ObservationCsv, WithoutAnObservationEveryMeasurementIsEmpty) {
     const CsvTable table = table_of(o);
     EXPECT_EQ(table.text(0, "status"), to_string(status));
     EXPECT_EQ(table.text(0, "instrument"), "PSM1");
-    EXPECT_EQ(empty_columns(table).size(), 35U) << to_string(status);
+    EXPECT_EQ(empty_columns(table).size(), 41U) << to_string(status);
   }
 }
 

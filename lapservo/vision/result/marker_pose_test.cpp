@@ -6,6 +6,7 @@
 
 #include "lapservo/core/angles.h"
 #include "lapservo/core/random.h"
+#include "lapservo/geometry/rotation.h"
 #include "lapservo/testing/scenes.h"
 #include "lapservo/vision/tracker.h"
 
@@ -32,6 +33,7 @@ void expect_sigmas_of(const Marker& marker, const PoseUnknowns& unknowns, Random
   const PoseMatrix root = random_covariance(sigma, random);
   const Observation::MarkerPose said = marker_pose_of(marker, unknowns, root * root.transpose());
   double xy = 0, z = 0, axis = 0, roll = 0;
+  TipInMarker::Covariance sum = TipInMarker::Covariance::Zero();
   for (int draw = 0; draw < draws; ++draw) {
     PoseVector normal;
     for (double& number : normal) number = random.normal();
@@ -40,9 +42,16 @@ void expect_sigmas_of(const Marker& marker, const PoseUnknowns& unknowns, Random
     const Eigen::Vector3d moved = is.translation - said.camera_from_marker.translation;
     xy += moved.head<2>().squaredNorm() / 2, z += moved.z() * moved.z();
     axis += column(error, 2).head<2>().squaredNorm();
+    Eigen::Matrix<double, 6, 1> all;
+    all << moved, rotation_vector_of(is.rotation * said.camera_from_marker.rotation.conjugate());
+    sum += all * all.transpose() / draws;
     roll += std::pow(std::atan2(column(error, 0).y(), column(error, 0).x()), 2);
   }
   constexpr double tolerance = 0.05;  // 4000 draws leave 1 to 2 %
+  const Eigen::Matrix<double, 6, 1> sigmas = said.covariance.diagonal().cwiseSqrt();
+  const TipInMarker::Covariance beside =
+      sigmas.cwiseInverse().asDiagonal() * (sum - said.covariance) * sigmas.cwiseInverse().asDiagonal();
+  EXPECT_LT(beside.cwiseAbs().maxCoeff(), 2 * tolerance);
   EXPECT_NEAR(std::sqrt(xy / draws) / said.sigma_xy_m, 1, tolerance);
   EXPECT_NEAR(std::sqrt(z / draws) / said.sigma_z_m, 1, tolerance);
   EXPECT_NEAR(std::sqrt(axis / draws) / said.sigma_axis_rad, 1, tolerance);

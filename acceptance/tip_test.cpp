@@ -1,0 +1,162 @@
+// How well the tip is known: truth by kinematics of the test's own, on rendered frames, with rigs that are off as they
+// say.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <numbers>
+#include <optional>
+#include <vector>
+
+#include <Eigen/Geometry>
+#include <gtest/gtest.h>
+
+#include "lapservo/core/random.h"
+#include "lapservo/geometry/rotation.h"
+#include "lapservo/testing/scenes.h"
+#include "lapservo/vision/tracker.h"
+
+namespace lapservo {
+using namespace internal;
+namespace {
+
+constexpr double degree = std::numbers::pi / 180;
+
+Eigen::Vector3d normal3(Random& random) {
+  return {random.normal(), random.normal(), random.normal()};
+}
+
+// Off by 1 mm and 5 mrad rms, and saying so.
+void misregister(Instrument& instrument, Random& random) {
+  const double sigma_m = 1e-3 / std::sqrt(3), sigma_rad = 5e-3 / std::sqrt(3);
+  Rigid3& pose = *instrument.camera_from_rcm;
+  pose.translation += sigma_m * normal3(random);
+  pose.rotation = (rotation_by(sigma_rad * normal3(random)) * pose.rotation).normalized();
+  instrument.registration_covariance.emplace().setZero();
+  instrument.registration_covariance->diagonal() << Eigen::Vector3d::Constant(sigma_m * sigma_m),
+      Eigen::Vector3d::Constant(sigma_rad * sigma_rad);
+}
+
+// Where the marker's frame is, without lapservo's kinematics: Rz(theta) Ry(phi) Rz(psi + seam), rho along z.
+Eigen::Isometry3d true_camera_from_marker(const Instrument& instrument, const JointVector& q) {
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  pose.translate(instrument.camera_from_rcm->translation).rotate(instrument.camera_from_rcm->rotation);
+  pose.rotate(Eigen::AngleAxisd(q.theta_rad, Eigen::Vector3d::UnitZ()));
+  pose.rotate(Eigen::AngleAxisd(q.phi_rad, Eigen::Vector3d::UnitY()));
+  pose.rotate(Eigen::AngleAxisd(q.psi_rad + instrument.marker.seam_rad, Eigen::Vector3d::UnitZ()));
+  return pose.translate(Eigen::Vector3d(0, 0, q.rho_m));
+}
+
+// A wrist as dVRK's needle driver has it: pitch about the base's y, then yaw about x turned with it, the tip beyond.
+struct Wrist {
+  double pitch_to_yaw_m = 0.0091, yaw_to_tip_m = 0.0102;
+  Eigen::Vector3d tip_in_base(double pitch, double yaw) const {
+    const Eigen::AngleAxisd by_pitch(pitch, Eigen::Vector3d::UnitY()), by_yaw(yaw, Eigen::Vector3d::UnitX());
+    return by_pitch * (Eigen::Vector3d(0, 0, pitch_to_yaw_m) + by_yaw * Eigen::Vector3d(0, 0, yaw_to_tip_m));
+  }
+  Tool tool() const {
+    constexpr double right = 90 * degree;
+    Tool tool;
+    tool.wrist = {{.name = "wrist_pitch", .alpha_rad = -right, .theta_rad = -right},
+                  {.name = "wrist_yaw", .alpha_rad = -right, .a_m = pitch_to_yaw_m, .theta_rad = -right}};
+    tool.last_from_tip.translation = {0, yaw_to_tip_m, 0};
+    return tool;
+  }
+};
+
+TEST(Tip, TestsWristIsTheToolsWrist) {
+  const Wrist wrist;
+  Tool tool = wrist.tool();
+  tool.place.emplace();
+  for (const double pitch : {-1.0, 0.0, 0.7})
+    for (const double yaw : {-0.6, 0.0, 1.1})
+      EXPECT_LT(
+          (tip_in_marker(tool, std::array{pitch, yaw}).marker_from_tip.translation - wrist.tip_in_base(pitch, yaw))
+              .norm(),
+          1e-12);
+}
+
+struct Errors {
+  std::vector<Eigen::Vector3d> off_m, by_sigma;  // camera's axes
+  int frames = 0;
+
+  void add(const std::optional<Observation::Tip>& tip, const Eigen::Vector3d& truth) {
+    ++frames;
+    if (!tip) return;
+    off_m.push_back(tip->camera_from_tip.translation - truth);
+    by_sigma.push_back(off_m.back().cwiseQuotient(tip->covariance.diagonal().head<3>().cwiseSqrt()));
+  }
+  static Eigen::Vector3d rms(const std::vector<Eigen::Vector3d>& all) {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (const Eigen::Vector3d& one : all) sum += one.cwiseAbs2();
+    return (sum / static_cast<double>(all.size())).cwiseSqrt();
+  }
+  void print(const char* of) const {
+    const Eigen::Vector3d mm = 1e3 * rms(off_m), sigmas = rms(by_sigma);
+    std::printf("%s: %zu of %d; x %.3f y %.3f z %.3f mm rms; by sigma %.2f %.2f %.2f\n", of, off_m.size(), frames,
+                mm.x(), mm.y(), mm.z(), sigmas.x(), sigmas.y(), sigmas.z());
+  }
+};
+
+TEST(Tip, OfAStraightToolIsFoundWhateverTheRegistration) {
+  Errors errors;
+  for (std::uint64_t seed = 1; seed <= 60; ++seed) {
+    Random random(seed);
+    const Rig truth = scenes::usual_rig();
+    Rig rig = truth;
+    misregister(rig.instruments[0], random);
+    const Eigen::Vector3d tip_in_marker_m(0, 0, 0.05);
+    rig.instruments[0].tool.emplace().place.emplace().base_in_marker_m = tip_in_marker_m;
+    const JointVector q = scenes::random_configuration(truth, 0, random);
+    const Observation seen = Tracker(rig).track(scenes::render(truth, {q}, seed))[0];
+    errors.add(seen.tip, true_camera_from_marker(truth.instruments[0], q) * tip_in_marker_m);
+  }
+  errors.print("straight tool");
+  ASSERT_GE(errors.off_m.size(), 57u);
+  const Eigen::Vector3d rms_m = Errors::rms(errors.off_m), sigmas = Errors::rms(errors.by_sigma);
+  EXPECT_LE(rms_m.head<2>().norm() / std::sqrt(2), 0.1e-3);
+  EXPECT_LE(rms_m.z(), 0.3e-3);
+  EXPECT_LE(sigmas.maxCoeff(), 1.5) << "the shaft's, as in accuracy_test";
+}
+
+TEST(Tip, OfAWristIsOffAsItsCovarianceSays) {
+  const Wrist wrist;
+  Errors errors;
+  double shaft = 0, place = 0, readings = 0;
+  for (std::uint64_t seed = 101; seed <= 200; ++seed) {
+    Random random(seed);
+    const Rig truth = scenes::usual_rig();
+    Rig rig = truth;
+    misregister(rig.instruments[0], random);
+    const double base_m = random.uniform(0.03, 0.05), azimuth_rad = random.uniform(-3, 3);
+    const std::array<double, 2> joints{random.uniform(-1, 1), random.uniform(-1, 1)};
+    Tool& tool = rig.instruments[0].tool.emplace(wrist.tool());
+    Tool::Place& said = tool.place.emplace();
+    said.covariance.diagonal().head<4>() << 2.5e-9, 2.5e-9, 1e-8, 1e-4;
+    said.base_in_marker_m =
+        Eigen::Vector3d(0, 0, base_m) + Eigen::Vector3d(5e-5, 5e-5, 1e-4).cwiseProduct(normal3(random));
+    said.azimuth_rad = azimuth_rad + 0.01 * random.normal();
+    const std::array<double, 2> read{joints[0] + degree * random.normal(), joints[1] + degree * random.normal()};
+    const JointVector q = scenes::random_configuration(truth, 0, random);
+    Tracker tracker(rig);
+    tracker.set_wrist(0, read);
+    const Observation seen = tracker.track(scenes::render(truth, {q}, seed))[0];
+    const Eigen::Vector3d in_marker_m =
+        Eigen::Vector3d(0, 0, base_m) +
+        Eigen::AngleAxisd(azimuth_rad, Eigen::Vector3d::UnitZ()) * wrist.tip_in_base(joints[0], joints[1]);
+    errors.add(seen.tip, true_camera_from_marker(truth.instruments[0], q) * in_marker_m);
+    if (!seen.tip) continue;
+    shaft += seen.tip->sigma_shaft_m, place += seen.tip->sigma_place_m, readings += seen.tip->sigma_readings_m;
+  }
+  errors.print("wrist");
+  ASSERT_GE(errors.off_m.size(), 95u);
+  const Eigen::Vector3d sigmas = Errors::rms(errors.by_sigma);
+  EXPECT_GE(sigmas.minCoeff(), 0.7);
+  EXPECT_LE(sigmas.maxCoeff(), 1.4);
+  EXPECT_GT(readings, std::max(shaft, place)) << "the wrist is the largest part";
+}
+
+}  // namespace
+}  // namespace lapservo

@@ -1,0 +1,29 @@
+#include <cmath>
+
+#include "lapservo/vision/observation.h"
+
+namespace lapservo {
+namespace {
+
+double position_sigma_m(const TipInMarker::Covariance& covariance) {
+  return std::sqrt(covariance.topLeftCorner<3, 3>().trace());
+}
+
+}  // namespace
+
+std::optional<Observation::Tip> tip_of(const Observation& seen, const Tool& tool, std::span<const double> wrist_rad) {
+  const bool is_read = tool.wrist.empty() || !wrist_rad.empty();
+  if (seen.status != Status::ok || !seen.marker || !tool.place || !is_read) return std::nullopt;
+  const TipInMarker tip = tip_in_marker(tool, wrist_rad);
+  const Rigid3& camera_from_marker = seen.marker->camera_from_marker;
+  const TipInMarker exact{tip.marker_from_tip};
+  Observation::Tip result;
+  result.camera_from_tip = camera_from_marker * tip.marker_from_tip;
+  result.covariance = tip_covariance_in_camera(camera_from_marker, seen.marker->covariance, tip);
+  result.sigma_shaft_m = position_sigma_m(tip_covariance_in_camera(camera_from_marker, seen.marker->covariance, exact));
+  result.sigma_place_m = position_sigma_m(tip.of_place);
+  result.sigma_readings_m = position_sigma_m(tip.of_readings);
+  return result;
+}
+
+}  // namespace lapservo
