@@ -28,21 +28,25 @@ struct WristJoint {
   bool operator==(const WristJoint&) const = default;
 };
 
+/// Where a tool's base lies in the marker's frame (origin at the proximal end on the axis, z along the axis to the tip,
+/// x towards tau = 0); its z is the marker's.
+struct ToolPlace {
+  static constexpr std::size_t max_wrist_joints = 4;
+  /// Order: base_in_marker_m [m], azimuth_rad, the wrist joints' offset_rad [rad]; zero where exact.
+  using Covariance = Eigen::Matrix<double, 4 + max_wrist_joints, 4 + max_wrist_joints>;
+
+  Eigen::Vector3d base_in_marker_m = Eigen::Vector3d::Zero();
+  double azimuth_rad = 0;  ///< of the base's x axis from tau = 0, right-handed about z; 0 for a straight tool
+  Covariance covariance = Covariance::Zero();
+  bool operator==(const ToolPlace&) const = default;
+};
+
 /// A tool behind an instrument's marker. Its base is the tip itself for a straight tool; for a wrist the frame in which
 /// the first joint's row stands (dVRK's frame after `roll`: z along the shaft, the first wrist axis is its y).
 struct Tool {
-  static constexpr std::size_t max_wrist_joints = 4;
-  /// Order: base_in_marker_m [m], azimuth_rad, the wrist joints' offset_rad [rad]; zero where exact.
-  using PlaceCovariance = Eigen::Matrix<double, 4 + max_wrist_joints, 4 + max_wrist_joints>;
-
-  /// Where the base lies in the marker's frame (origin at the proximal end on the axis, z along the axis to the tip, x
-  /// towards tau = 0); its z is the marker's.
-  struct Place {
-    Eigen::Vector3d base_in_marker_m = Eigen::Vector3d::Zero();
-    double azimuth_rad = 0;  ///< of the base's x axis from tau = 0, right-handed about z; 0 for a straight tool
-    PlaceCovariance covariance = PlaceCovariance::Zero();
-    bool operator==(const Place&) const = default;
-  };
+  static constexpr std::size_t max_wrist_joints = ToolPlace::max_wrist_joints;
+  using Place = ToolPlace;  // not nested: Clang makes no optional of a nested class with defaults within its outer one
+  using PlaceCovariance = ToolPlace::Covariance;
 
   std::vector<WristJoint> wrist;  ///< proximal to distal; none: straight
   Rigid3 last_from_tip;           ///< the tip in the frame of the last joint, or of the base
