@@ -163,6 +163,10 @@ class MarkerPose:
     @property
     def covariance(self) -> _Array: ...
 
+class WristJoint:
+    @property
+    def name(self) -> str: ...
+
 class TipPose:
     @property
     def camera_from_tip(self) -> _Array: ...

@@ -211,8 +211,9 @@ void bind_rig(py::module_& m) {
 The bands run from proximal to distal; tau is the azimuth on the marker from its seam, right-handed about the axis
 towards the tip.)");
   bind_state(marker);
-  py::class_<WristJoint> wrist_joint(m, "_WristJoint", "A joint of a wrist, for pickles.");
+  py::class_<WristJoint> wrist_joint(m, "WristJoint", "A joint of a tool's wrist, as a rig's pickle holds it.");
   bind_state(wrist_joint);
+  wrist_joint.def_readonly("name", &WristJoint::name);
   bind_instrument(m);
   py::class_<Rig, std::shared_ptr<Rig>> type(m, "Rig", R"(What stands before which camera.
 
