@@ -120,7 +120,9 @@ void Interlock::on_measured(const JointMessage& message, double arrival_s) {
   if (!time_s) return;
   ++counts_.joint_states;
   finite_ = all_finite(message.positions);
-  if (finite_) measured_ = Reading{*time_s, arrival_s, message.positions, q_of(message, *places)};
+  if (finite_)
+    measured_ =
+        Reading{*time_s, arrival_s, message.positions, wrist_in(message, config_.wrist), q_of(message, *places)};
   if (finite_) readings_.add({*time_s, JointVector::from_vector(measured_->q)});
   watch_rest(arrival_s);
   watch(arrival_s);
@@ -133,12 +135,14 @@ void Interlock::on_setpoint(const JointMessage& message, double arrival_s) {
   if (!places || !all_finite(message.positions)) return;
   const auto time_s = stamped(setpoint_clock_, message, arrival_s);
   if (!time_s) return;
-  setpoint_ = Reading{*time_s, arrival_s, message.positions, q_of(message, *places)};
+  setpoint_ = Reading{*time_s, arrival_s, message.positions, {}, q_of(message, *places)};
   if (phase_ == Phase::idle) {
     names_ = message.names;
     places_ = *places;
   } else if (config_.motion_enabled && (message.names != names_ || !is_ours(*setpoint_))) {
     on_foreign_command(arrival_s);
+  } else {
+    pass_wrist_through();
   }
   watch_rest(arrival_s);
   watch(arrival_s);
@@ -163,9 +167,24 @@ bool Interlock::is_ours(const Reading& setpoint) const {
   for (std::size_t i = 0; i + 1 < sent_.size() && !ours; ++i)
     ours = setpoint.time_s - sent_[i + 1].time_s <= memory_s && lies_between(setpoint.q, sent_[i].q, sent_[i + 1].q);
   for (std::size_t i = 0; i < others_.size() && ours; ++i)
-    ours = std::find(places_.begin(), places_.end(), i) != places_.end() ||
+    ours = std::find(places_.begin(), places_.end(), i) != places_.end() || is_wrist(i) ||
            std::abs(setpoint.positions[i] - others_[i]) <= same_other;
   return ours;
+}
+
+bool Interlock::is_wrist(std::size_t place) const {
+  return std::any_of(config_.wrist.begin(), config_.wrist.end(),
+                     [&](const std::string& name) { return is_same_joint(name, names_[place]); });
+}
+
+// The arm's rounding is not sent back, lest it creep; where somebody moves the wrist it follows at once.
+void Interlock::pass_wrist_through() {
+  const std::vector<double>& now = setpoint_->positions;
+  for (std::size_t i = 0; i < others_.size(); ++i)
+    if (is_wrist(i) && std::abs(now[i] - others_[i]) > same_other) wrist_moved_s_ = setpoint_->time_s;
+  if (!wrist_moved_s_ || setpoint_->time_s - *wrist_moved_s_ > rest_s) return;
+  for (std::size_t i = 0; i < others_.size(); ++i)
+    if (is_wrist(i)) others_[i] = now[i];
 }
 
 // Somebody may move the arm in its own program, which publishes no command then.
@@ -237,6 +256,7 @@ JointState Interlock::state(double now_s) {
   state.follows = config_.motion_enabled;
   state.blocked = std::exchange(untold_, Blocked::none);
   if (measured_) state.time_s = measured_->time_s, state.q = JointVector::from_vector(measured_->q);
+  if (measured_) state.wrist_rad = measured_->wrist_rad;
   if (!operating_state_) return state;
   const auto known = operating_state_from_string(operating_state_->state);
   state.operating_state = known.value_or(OperatingState::disabled);

@@ -30,6 +30,8 @@ struct InterlockConfig {
   bool motion_enabled = false;  ///< else it observes only: no setpoint leaves
   /// Farther than this from its setpoint an arm is not started: theta, phi [rad], rho [m], psi [rad].
   Eigen::Vector4d max_distance{0.05, 0.05, 0.005, 0.2};
+  /// Names of the joints of the rig's tool, by those of dVRK 2.3 and later or before.
+  std::vector<std::string> wrist{};
 };
 
 /// Counts of dropped and withheld messages.
@@ -49,9 +51,10 @@ struct InterlockCounts {
 ///
 /// Motion starts at the arm's own setpoint, to which a path's start is moved. Setpoints keep to the limits of position
 /// (or come nearer to them), rate and acceleration, from one period to the next, whatever the path does and however
-/// late a period is. Joints beyond the four stay at their setpoint of the start. As soon as the arm is not ready the
-/// path is dropped: an arm that does not obey gets nothing more, one that still listens is braked to rest first.
-/// state() reports the reason, however short it was, and no new path is followed before.
+/// late a period is. Joints beyond the four stay at their setpoint of the start, but the wrist of the tool belongs to
+/// somebody else: it may move, and its setpoints pass through. As soon as the arm is not ready the path is dropped: an
+/// arm that does not obey gets nothing more, one that still listens is braked to rest first. state() reports the
+/// reason, however short it was, and no new path is followed before.
 ///
 /// A topic belongs to its first sender: messages of another one are not used before the arm has fallen silent. Then it
 /// is another arm, of which nothing is known yet.
@@ -96,7 +99,7 @@ class Interlock {
  private:
   struct Reading {
     double time_s = 0, arrival_s = 0;
-    std::vector<double> positions;
+    std::vector<double> positions, wrist_rad{};
     Eigen::Vector4d q = Eigen::Vector4d::Zero();
   };
   struct Sent {
@@ -117,6 +120,8 @@ class Interlock {
   void watch_rest(double now_s);
   void start(double now_s);
   bool is_ours(const Reading& setpoint) const;
+  bool is_wrist(std::size_t place) const;
+  void pass_wrist_through();
   Eigen::Vector4d within_limits(const Eigen::Vector4d& wanted) const;
   double next_velocity(Eigen::Index joint, double away, double path_velocity) const;
   bool approach(const MotionState& wanted);
@@ -149,8 +154,9 @@ class Interlock {
   std::optional<double> silent_since_s_;  // of an arm that moved
   Eigen::Vector4d shift_ = Eigen::Vector4d::Zero(), last_ = Eigen::Vector4d::Zero(),
                   velocity_ = Eigen::Vector4d::Zero();
-  std::vector<double> others_;  // all joints' setpoints at the start
+  std::vector<double> others_;  // all joints' setpoints at the start, of the wrist's as they pass through
   std::deque<Sent> sent_;       // of the last second
+  std::optional<double> wrist_moved_s_;
   /// Where an arm was that we do not move, from when on, and when it left such a place last.
   struct Rest {
     double since_s = 0;

@@ -1,5 +1,6 @@
 #include "lapservo/crtk/interlock.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <deque>
@@ -76,7 +77,7 @@ class Bench {
       if (!sent && now_s >= stalled_until_s) rate_.setZero();  // it rests
       if (!sent) continue;
       EXPECT_EQ(sent->size(), 5u);
-      EXPECT_EQ(sent->at(2), wrist);
+      EXPECT_NEAR(sent->at(2), wrist, wrist_behind);
       const Eigen::Vector4d q = q_from_joints(psm(), {sent->at(0), sent->at(1), sent->at(3), sent->at(4)});
       const Eigen::Array4d step = (q - setpoint).array().abs();
       EXPECT_TRUE((step <= config_.limits.rate.array() * tick_s + 1e-12).all()) << step.transpose();
@@ -88,6 +89,7 @@ class Bench {
       setpoint = q;
       if (lag_s > 0) on_their_way_.emplace_back(now_s + lag_s, q);
       last_sent_s = now_s;
+      last_wrist = sent->at(2);
       ++sent_count;
     }
   }
@@ -110,7 +112,8 @@ class Bench {
   Interlock interlock;
   JointPath path{JointLimits().acceleration};
   Eigen::Vector4d setpoint{0.1, 1.5, 0.08, 0.5}, sag{0.004, -0.003, 0.001, 0.02};
-  double now_s = 10, stalled_until_s = 0, lag_s = 0, rounding_rad = 0, wrist = 0.3, last_sent_s = 0;
+  double now_s = 10, stalled_until_s = 0, lag_s = 0, rounding_rad = 0, wrist = 0.3, wrist_behind = 0, last_wrist = 0,
+         last_sent_s = 0;
   int sent_count = 0;
   Blocked blocked = Blocked::none;
   bool talking = true;
@@ -166,6 +169,49 @@ TEST(Interlock, FollowsFromTheArmsOwnSetPointOn) {
   EXPECT_GT(bench.sent_count, 450);
   EXPECT_TRUE((bench.setpoint - start).isApprox(slow, 0.1));
   EXPECT_EQ(bench.interlock.state(bench.now_s).blocked, Blocked::none);
+}
+
+// Somebody else moves it, through the arm's own setpoint; neither ends the motion of the four.
+TEST(Interlock, TheWristPassesThrough) {
+  InterlockConfig config = config_of();
+  config.wrist = {"outer_wrist"};  // by the name before dVRK 2.3
+  Bench bench(config);
+  bench.control(0.2, slow);
+  bench.wrist_behind = 1e-2;  // until the arm says so
+  double fastest_rad = 0;
+  for (int k = 0; k < 60; ++k) {
+    bench.wrist += 0.5 / 60;
+    bench.control(1.0 / 60, slow);
+    EXPECT_EQ(bench.blocked, Blocked::none) << k;
+    fastest_rad = std::max(fastest_rad, std::abs(bench.last_wrist - bench.wrist));
+  }
+  EXPECT_EQ(fastest_rad, 0);  // once it moves it follows at once
+  EXPECT_GT(bench.sent_count, 500);
+}
+
+// Sent back, the arm's rounding would add up.
+TEST(Interlock, AWristThatTheArmRoundsStaysWhereItWas) {
+  InterlockConfig config = config_of();
+  config.wrist = {"wrist"};
+  Bench bench(config);
+  bench.control(0.2, slow);
+  const double before = bench.wrist;
+  bench.wrist_behind = 3.1e-3;
+  bench.wrist += 3e-3;
+  bench.control(1, slow);
+  EXPECT_EQ(bench.last_wrist, before);
+}
+
+TEST(Interlock, ReportsTheWristOfTheTool) {
+  InterlockConfig config = config_of();
+  config.wrist = {"outer_wrist"};
+  Bench bench(config);
+  bench.pass(0.1);
+  EXPECT_EQ(bench.interlock.state(bench.now_s).wrist_rad, std::vector<double>{bench.wrist});
+  config.wrist = {"wrist", "jaw"};
+  Bench without(config);
+  without.pass(0.1);
+  EXPECT_TRUE(without.interlock.state(without.now_s).wrist_rad.empty());
 }
 
 TEST(Interlock, NoStepExceedsTheRateLimitWhateverThePathDoes) {

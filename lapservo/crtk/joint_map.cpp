@@ -60,6 +60,24 @@ std::optional<std::array<std::size_t, 4>> find_joints(const Joints& joints, cons
   return other ? find_names(*other, names) : std::nullopt;
 }
 
+bool is_same_joint(std::string_view a, std::string_view b) {
+  constexpr std::string_view before = "outer_";
+  for (std::string_view* name : {&a, &b})
+    if (name->starts_with(before)) name->remove_prefix(before.size());
+  return a == b;
+}
+
+std::vector<double> wrist_in(const JointMessage& message, const std::vector<std::string>& names) {
+  std::vector<double> positions;
+  for (const std::string& name : names) {
+    const auto is_it = [&](const std::string& other) { return is_same_joint(other, name); };
+    if (std::count_if(message.names.begin(), message.names.end(), is_it) != 1) return {};
+    const auto found = std::find_if(message.names.begin(), message.names.end(), is_it);
+    positions.push_back(message.positions[static_cast<std::size_t>(found - message.names.begin())]);
+  }
+  return positions;
+}
+
 std::string repeated_joint(const Joints& joints, const std::vector<std::string>& names) {
   const std::string repeated = repeated_of(joints.names, names);
   const auto other = other_names(joints);

@@ -27,6 +27,8 @@ struct JointState {
   Blocked blocked = Blocked::none;
   /// The state as the arm names it, where that is no OperatingState ("READY"): operating_state is disabled then.
   std::string other_state{};
+  /// The wrist's joints behind the shaft, in the order of the rig's tool; empty where the arm does not measure them.
+  std::vector<double> wrist_rad{};
 };
 
 /// The joints at one time, on the loop's clock.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <numbers>
 #include <utility>
 
@@ -14,7 +15,8 @@ namespace lapservo::internal {
 namespace {
 
 constexpr const char* compressed_topic = "image_raw/compressed";
-constexpr std::array wrist{0.1, -0.2};  // where its joints stay
+constexpr std::array wrist{0.1, -0.2};  // where its joints stay, or swing from
+constexpr double swing_s = 4, wrist_behind_rad = 0.02;
 
 std::vector<std::string> names_with_wrist(const Joints& joints) {
   std::vector<std::string> names(joints.names.begin(), joints.names.end());
@@ -47,6 +49,7 @@ SimRobot::SimRobot(Transport& transport, const Rig& rig, Simulator& simulator, c
       config_(config),
       joints_(rig.instruments.front().joints.value_or(default_joints())),
       arm_(transport, config.arm, names_with_wrist(joints_)),
+      wrist_rad_(wrist.begin(), wrist.end()),
       setpoint_(simulator.measured_jp()),
       last_wanted_(setpoint_),
       image_(transport.image_publisher(topic_of(config.camera, "image_raw"))),
@@ -74,7 +77,8 @@ void SimRobot::obey(const std::vector<double>& positions) {
   setpoint_ = q_from_joints(joints_, Eigen::Vector4d(positions.data()));
   ++statistics_.count;
   statistics_.max_step = statistics_.max_step.cwiseMax((setpoint_ - last_wanted_).cwiseAbs());
-  for (std::size_t i = 0; i < wrist.size(); ++i) statistics_.wrist_moved += positions[4 + i] != wrist[i];
+  for (std::size_t i = 0; i < wrist_rad_.size(); ++i)
+    statistics_.wrist_moved += std::abs(positions[4 + i] - wrist_rad_[i]) > wrist_behind_rad;
   last_wanted_ = setpoint_;
 }
 
@@ -97,6 +101,7 @@ ServoStatistics SimRobot::statistics() const {
 
 void SimRobot::advance(double time_s) {
   stamp_at_0_s_ = transport_.stamp_now_s() - time_s;
+  wrist_rad_[0] = wrist[0] + config_.wrist_swing_rad * (1 - std::cos(2 * std::numbers::pi * time_s / swing_s)) / 2;
   for (const std::string& command : arm_.new_commands()) obey(command);
   if (const auto positions = arm_.new_setpoint()) obey(*positions);
   // An arm that is not enabled wants to be where it is.
@@ -114,7 +119,7 @@ void SimRobot::advance(double time_s) {
 JointMessage SimRobot::message_of(const Eigen::Vector4d& q) const {
   const Eigen::Vector4d joints = joints_from_q(joints_, q);
   std::vector<double> positions(joints.data(), joints.data() + 4);
-  positions.insert(positions.end(), wrist.begin(), wrist.end());
+  positions.insert(positions.end(), wrist_rad_.begin(), wrist_rad_.end());
   return arm_.joints(std::move(positions));
 }
 

@@ -24,6 +24,7 @@ struct SimRobotConfig {
   std::string arm = "PSM1";           ///< namespace of the CRTK topics
   std::string camera = "/endoscope";  ///< namespace of image_raw and camera_info
   double joint_rate_hz = 250;         ///< of measured_js and setpoint_js
+  double wrist_swing_rad = 0;         ///< of its first joint by somebody else, there and back within 4 s
   /// For tests of who steers it: changes what it says.
   std::function<void(JointMessage&)> alter_measured{};
   std::function<void(ImageMessage&)> alter_image{};
@@ -33,7 +34,8 @@ struct SimRobotConfig {
 struct ServoStatistics {
   long count = 0;
   Eigen::Vector4d max_step = Eigen::Vector4d::Zero();  ///< of q, from the previous setpoint: rad, m
-  long wrist_moved = 0, malformed = 0;
+  long wrist_moved = 0;                                ///< those in which the wrist was not where it is
+  long malformed = 0;
 };
 
 /// The simulator behind the topics of a CRTK PSM and its camera: measured_js, setpoint_js, operating_state out,
@@ -67,6 +69,7 @@ class SimRobot {
   SimRobotConfig config_;
   Joints joints_;
   CrtkArm arm_;
+  std::vector<double> wrist_rad_;
   Eigen::Vector4d setpoint_, last_wanted_;
   double next_joints_s_ = 0, stamp_at_0_s_ = 0;
 

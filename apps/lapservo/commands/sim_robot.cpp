@@ -29,7 +29,7 @@ namespace {
 struct SimRobotOptions {
   std::string rig, transport = "ros2", arm = "SIM_PSM1", camera = "/endoscope";
   std::vector<double> start;
-  double latency_ms = 80, fps = 30, duration_s = 0;
+  double latency_ms = 80, fps = 30, duration_s = 0, swing_wrist_rad = 0;
   std::uint64_t seed = 1;
 };
 
@@ -79,6 +79,7 @@ int run(const SimRobotOptions& options) {
   SimRobotConfig config;
   config.arm = resolved_name({options.transport, options.arm}, "--arm");
   config.camera = resolved_name({options.transport, options.camera}, "--camera");
+  config.wrist_swing_rad = options.swing_wrist_rad;
   watch_for_interrupts();
   refuse_taken_name(*transport, config, options.arm);
   SimRobot robot(*transport, rig, simulator, config);
@@ -122,6 +123,10 @@ void add_sim_robot(Command app, Run& run_later) {
   command.add_option("--seed", options->seed, "Seed of start, tissue, noise, jitter").seed_number();
   command.add_option("--latency-ms", options->latency_ms, "From exposure to publication").number_between(0.0, 1000.0);
   command.add_option("--fps", options->fps, "Frames a second").number_between(6.0, 120.0);
+  command
+      .add_option("--swing-wrist", options->swing_wrist_rad,
+                  "Rad: the wrist's first joint moves by itself, there and back within 4 s")
+      .number_between(0.0, 1.0);
   command.add_option("--duration", options->duration_s, "Seconds; 0: until interrupted").number_between(0.0, 1e6);
   command.footer(
       "Example, in two terminals (ROS_LOCALHOST_ONLY=1 keeps it on this computer):\n"
