@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <string>
 #include <utility>
 
@@ -93,7 +94,38 @@ DesiredFeatures spline_at(const Spline& spline, double time_s) {
           (y1 - y0) / h + ((3 * b * b - 1) * m1 - (3 * a * a - 1) * m0) * (h / 6), a * m0 + b * m1};
 }
 
+void refuse_odd_tip(const TipGoal& goal, const std::string& source) {
+  constexpr std::array<const char*, 3> names{"x_m", "y_m", "z_m"};
+  constexpr double farthest_m = 1;
+  for (int i = 0; i < 3; ++i)
+    if (const double value = goal.position_m[i]; !(std::abs(value) <= farthest_m))
+      throw InputError(source, std::string("tip.") + names[static_cast<std::size_t>(i)], std::to_string(value),
+                       std::isfinite(value) ? "metres: it looks like millimetres" : "a finite number");
+  if (goal.roll_rad && !(std::abs(*goal.roll_rad) <= two_pi))
+    throw InputError(source, "tip.roll_rad", std::to_string(*goal.roll_rad),
+                     std::isfinite(*goal.roll_rad) ? "radians within 2 pi: it looks like degrees" : "a finite number");
+}
+
+// A goal of the tip has none by itself.
+DesiredFeatures no_features(double) {
+  DesiredFeatures none;
+  none.features.setConstant(std::numeric_limits<double>::quiet_NaN());
+  return none;
+}
+
+Trajectory tip_from_table(const CsvTable& table, const std::string& source) {
+  std::vector<double> times_s;
+  std::vector<TipGoal> goals;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    times_s.push_back(table.number(row, "time_s"));
+    goals.push_back({{table.number(row, "x_m"), table.number(row, "y_m"), table.number(row, "z_m")}});
+    if (table.has("roll_rad")) goals.back().roll_rad = table.number(row, "roll_rad");
+  }
+  return tip_trajectory_through(std::move(times_s), goals, source);
+}
+
 Trajectory from_table(const CsvTable& table, const std::string& source) {
+  if (table.has("x_m")) return tip_from_table(table, source);
   std::vector<double> times_s;
   std::vector<Eigen::Vector4d> values;
   for (std::size_t row = 0; row < table.rows(); ++row) {
@@ -156,7 +188,7 @@ Trajectory via_points(const std::vector<Eigen::Vector4d>& points, const Eigen::V
 Trajectory trajectory_through(std::vector<double> times_s, std::vector<Eigen::Vector4d> features,
                               const std::string& source) {
   if (times_s.size() < 2 || times_s.size() != features.size())
-    throw InputError(source, "expected at least two rows of time_s,s_rad,r_px,l_px,d_px");
+    throw InputError(source, "expected at least two rows of time_s,s_rad,r_px,l_px,d_px or time_s,x_m,y_m,z_m");
   for (std::size_t row = 0; row < times_s.size(); ++row) {
     require_finite_features("features", features[row]);
     if (!std::isfinite(times_s[row]) || (row > 0 && !(times_s[row] > times_s[row - 1])))
@@ -168,6 +200,27 @@ Trajectory trajectory_through(std::vector<double> times_s, std::vector<Eigen::Ve
   return between(start_s, end_s, [spline = natural_spline(std::move(times_s), std::move(features))](double time_s) {
     return spline_at(spline, time_s);
   });
+}
+
+Trajectory tip_set_point(const TipGoal& goal, const std::string& source) {
+  refuse_odd_tip(goal, source);
+  return {0, no_features, [goal](double) { return goal; }};
+}
+
+Trajectory tip_trajectory_through(std::vector<double> times_s, const std::vector<TipGoal>& goals,
+                                  const std::string& source) {
+  std::vector<Eigen::Vector4d> rolls_and_places;  // the roll comes first, where features have the angle s
+  for (const TipGoal& goal : goals) {
+    refuse_odd_tip(goal, source);
+    rolls_and_places.emplace_back();
+    rolls_and_places.back() << goal.roll_rad.value_or(0), goal.position_m;
+  }
+  const Trajectory through = trajectory_through(std::move(times_s), std::move(rolls_and_places), source);
+  const bool turns = !goals.empty() && goals.front().roll_rad;
+  return {through.duration_s, no_features, [at = through.at, turns](double time_s) {
+            const Eigen::Vector4d now = at(time_s).features;
+            return TipGoal{now.tail<3>(), turns ? std::optional(now[0]) : std::nullopt};
+          }};
 }
 
 Trajectory trajectory_from_csv(const std::filesystem::path& path) {

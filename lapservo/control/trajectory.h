@@ -2,11 +2,13 @@
 
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 
 namespace lapservo {
 
@@ -17,11 +19,23 @@ struct DesiredFeatures {
   Eigen::Vector4d acceleration = Eigen::Vector4d::Zero();
 };
 
+/// Where the tip of the instrument's tool is wanted, in the camera's frame. The roll is psi, or what comes nearest to
+/// an orientation of the tip; without either it is free and stays as it is.
+struct TipGoal {
+  Eigen::Vector3d position_m = Eigen::Vector3d::Zero();
+  std::optional<double> roll_rad{};
+  std::optional<Eigen::Quaterniond> camera_from_tip{};
+};
+
 /// f_d(t) for t >= 0; before 0 and after `duration_s` (0: endless) it rests where it is then, unless it is endless.
 /// s is continuous, not wrapped.
 struct Trajectory {
   double duration_s = 0;
   std::function<DesiredFeatures(double time_s)> at;
+  /// Where it gives a goal of the tip, that counts and `at` does not: run() turns it into features.
+  std::function<std::optional<TipGoal>(double time_s)> tip{};
+
+  std::optional<TipGoal> tip_at(double time_s) const { return tip ? tip(time_s) : std::nullopt; }
 };
 
 Trajectory set_point(const Eigen::Vector4d& features);
@@ -45,7 +59,16 @@ Trajectory via_points(const std::vector<Eigen::Vector4d>& points, const Eigen::V
 /// at the first one's time. s is unwrapped. Throws InputError naming `source`, row and field.
 Trajectory trajectory_through(std::vector<double> times_s, std::vector<Eigen::Vector4d> features,
                               const std::string& source);
-/// The same through rows of time_s,s_rad,r_px,l_px,d_px.
+/// The tip's, at rest. Throws InputError, naming `source`, for numbers that are not finite and places farther than 1 m
+/// from the camera, which look like millimetres.
+Trajectory tip_set_point(const TipGoal& goal, const std::string& source);
+
+/// The same spline through places of the tip, with its roll or without.
+Trajectory tip_trajectory_through(std::vector<double> times_s, const std::vector<TipGoal>& goals,
+                                  const std::string& source);
+
+/// The same through rows of time_s,s_rad,r_px,l_px,d_px, or of the tip: time_s,x_m,y_m,z_m and, for a roll that is
+/// not free, roll_rad.
 Trajectory trajectory_from_csv(const std::filesystem::path& path);
 Trajectory trajectory_from_csv_text(std::string_view text, const std::string& source);
 

@@ -43,15 +43,6 @@ std::optional<std::string> outside_window(const ImageWindow& window, const Eigen
   return std::nullopt;
 }
 
-std::optional<std::string> broken_limit(const ControllerConfig& config, const FeatureState& state,
-                                        const Eigen::Vector4d& q, const Eigen::Vector4d& rate) {
-  const DampedInverse inverse = damped_inverse(state.jacobian, config.scales, config.damping_threshold);
-  if (inverse.min_singular_value < config.min_singular_value) return "the Jacobian is singular";
-  if (auto broken = broken_joint_limit(config.limits, q, inverse.inverse * rate)) return broken;
-  if (config.window) return outside_window(*config.window, state.ends_px);
-  return std::nullopt;
-}
-
 // By any marker's image, whatever the camera: the third boundary lies between the two ends.
 bool can_be_shown(const Eigen::Vector4d& features) {
   const double r_px = features[1], l_px = features[2], d_px = features[3];
@@ -65,6 +56,15 @@ std::string angle_text(double s_rad) {
 }
 
 }  // namespace
+
+std::optional<std::string> broken_limit(const ControllerConfig& config, const FeatureState& state,
+                                        const Eigen::Vector4d& q, const Eigen::Vector4d& rate) {
+  const DampedInverse inverse = damped_inverse(state.jacobian, config.scales, config.damping_threshold);
+  if (inverse.min_singular_value < config.min_singular_value) return "the Jacobian is singular";
+  if (auto broken = broken_joint_limit(config.limits, q, inverse.inverse * rate)) return broken;
+  if (config.window) return outside_window(*config.window, state.ends_px);
+  return std::nullopt;
+}
 
 std::string Infeasible::text() const {
   std::array<char, 64> begin{};

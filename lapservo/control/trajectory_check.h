@@ -33,4 +33,8 @@ std::optional<Infeasible> find_infeasible(const Trajectory& trajectory, double d
 void refuse_infeasible(const Trajectory& trajectory, double duration_s, const FeatureModel& model,
                        const ControllerConfig& config, const JointVector& q_start, const std::string& source);
 
+/// The limit that a configuration breaks, which shows these features and lets them move at this rate; nullopt for none.
+std::optional<std::string> broken_limit(const ControllerConfig& config, const FeatureState& state,
+                                        const Eigen::Vector4d& q, const Eigen::Vector4d& feature_rate);
+
 }  // namespace lapservo

@@ -148,5 +148,25 @@ TEST_F(TrajectoryCheck, NamesTimeAndLimit) {
   expect_problem(set_point({0.9, 795, 365, 900}), config, "");
 }
 
+TEST(Trajectory, OfTheTipPassesItsPlacesAndTurnsTheShorterWay) {
+  const Trajectory free = trajectory_from_csv_text("time_s,x_m,y_m,z_m\n0,0,0,0.1\n2,0.01,0,0.1\n4,0,0.01,0.12\n", "t");
+  EXPECT_EQ(free.duration_s, 4);
+  EXPECT_EQ(free.tip_at(2)->position_m, Eigen::Vector3d(0.01, 0, 0.1));
+  EXPECT_EQ(free.tip_at(9)->position_m, Eigen::Vector3d(0, 0.01, 0.12));  // rests at the end
+  EXPECT_FALSE(free.tip_at(1)->roll_rad);
+  EXPECT_TRUE(free.at(1).features.array().isNaN().all());  // no features by itself
+  const Trajectory turned = trajectory_from_csv_text("time_s,x_m,y_m,z_m,roll_rad\n0,0,0,0.1,3\n2,0,0,0.1,-3\n", "t");
+  EXPECT_NEAR(*turned.tip_at(1)->roll_rad, pi, 1e-9);
+  EXPECT_FALSE(set_point({1, 2, 3, 4}).tip_at(0));
+}
+
+TEST(Trajectory, OfTheTipRefusesOtherUnits) {
+  const auto refused = [](const TipGoal& goal) { return testing::input_error([&] { tip_set_point(goal, "--tip"); }); };
+  EXPECT_EQ(refused({{0.01, 0.02, 0.12}, 1.5}), "");
+  EXPECT_NE(refused({{10, 20, 120}}).find("looks like millimetres"), std::string::npos);
+  EXPECT_NE(refused({{0, 0, 0.1}, 90}).find("looks like degrees"), std::string::npos);
+  EXPECT_NE(refused({{0, NAN, 0.1}}).find("tip.y_m: is nan, expected a finite number"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace lapservo::internal

@@ -57,21 +57,44 @@ std::string topic(const Rig& rig, const std::string& name) {
 std::optional<Trajectory> trajectory_of(const TrajectoryMessage& message) {
   constexpr double longest_s = 3600;
   constexpr std::size_t most = 10000;
-  if (message.names != feature_names() || message.points.empty() || message.points.size() > most ||
+  const std::vector<std::string> places{"x_m", "y_m", "z_m"}, turned_places{"x_m", "y_m", "z_m", "roll_rad"};
+  const bool turns = message.names == turned_places, of_tip = turns || message.names == places;
+  if ((!of_tip && message.names != feature_names()) || message.points.empty() || message.points.size() > most ||
       !(message.points.front().time_s >= 0) || !(message.points.back().time_s <= longest_s))
     return std::nullopt;
   std::vector<double> times_s;
   std::vector<Eigen::Vector4d> features;
+  std::vector<TipGoal> tips;
   for (const TrajectoryMessage::Point& point : message.points) {
-    if (point.positions.size() != FeatureVector::size) return std::nullopt;
+    const std::vector<double>& values = point.positions;
+    if (values.size() != message.names.size()) return std::nullopt;
     times_s.push_back(point.time_s);
-    features.emplace_back(point.positions.data());
+    if (of_tip) {
+      tips.push_back({Eigen::Vector3d(values.data()), turns ? std::optional(values[3]) : std::nullopt});
+    } else {
+      features.emplace_back(values.data());
+    }
   }
   try {
-    return trajectory_through(std::move(times_s), std::move(features), "trajectory");
+    return of_tip ? tip_trajectory_through(std::move(times_s), tips, "trajectory")
+                  : trajectory_through(std::move(times_s), std::move(features), "trajectory");
   } catch (const InputError&) {
     return std::nullopt;
   }
+}
+
+// Throws InputError for what is no pose.
+TipGoal tip_goal_of(const PlaceMessage& message) {
+  constexpr double rounding = 1e-3;
+  const Eigen::Quaterniond& turn = message.pose.rotation;
+  TipGoal goal{message.pose.translation};
+  if (turn.coeffs() != Eigen::Vector4d(0, 0, 0, 1)) {
+    if (!(std::abs(turn.norm() - 1) < rounding))
+      throw InputError("tip_goal", "orientation", fmt::format("of norm {}", turn.norm()), "a unit quaternion");
+    goal.camera_from_tip = turn.normalized();
+  }
+  tip_set_point(goal, "tip_goal");
+  return goal;
 }
 
 }  // namespace
@@ -97,6 +120,8 @@ LoopTopics::LoopTopics(Transport& transport, const Rig& rig, const FrameNames& f
       transport.subscribe_strings(topic(rig, "command"), [this](StringMessage&& command) { hear(command); }));
   subscriptions_.push_back(
       transport.subscribe_joints(topic(rig, "set_point"), [this](JointMessage&& set_point) { hear(set_point); }));
+  subscriptions_.push_back(
+      transport.subscribe_places(topic(rig, "tip_goal"), [this](PlaceMessage&& tip_goal) { hear(tip_goal); }));
   subscriptions_.push_back(transport.subscribe_trajectories(
       topic(rig, "trajectory"), [this](TrajectoryMessage&& trajectory) { hear(trajectory); }));
 }
@@ -188,9 +213,16 @@ void LoopTopics::hear(const StringMessage& command) {
   wishes_.stops.insert(command.source);
   if (words == "stop") return;
   ++malformed_;
-  if (wishes_.remarks.size() < most_remarks)
-    wishes_.remarks.insert(fmt::format("stopped by the unknown command '{}': expected start, start force or stop",
-                                       printable(command.text)));
+  remark(
+      fmt::format("stopped by the unknown command '{}': expected start, start force or stop", printable(command.text)));
+}
+
+void LoopTopics::remark(const std::string& text) {
+  if (wishes_.remarks.size() < most_remarks) wishes_.remarks.insert(text);
+}
+
+void LoopTopics::want_instead() {
+  wishes_.set_point.reset(), wishes_.tip_goal.reset(), wishes_.trajectory.reset();
 }
 
 void LoopTopics::hear_start(const StringMessage& command, bool force) {
@@ -215,10 +247,22 @@ void LoopTopics::hear(const JointMessage& set_point) {
                                  [](double value) { return std::isfinite(value); });
   const std::lock_guard lock(mutex_);
   if (whole) {
+    want_instead();
     wishes_.set_point = Eigen::Vector4d(set_point.positions.data());
-    wishes_.trajectory.reset();
   } else {
     ++malformed_;
+  }
+}
+
+void LoopTopics::hear(const PlaceMessage& message) {
+  const std::lock_guard lock(mutex_);
+  try {
+    const TipGoal goal = tip_goal_of(message);
+    want_instead();
+    wishes_.tip_goal = goal;
+  } catch (const InputError& error) {
+    ++malformed_;
+    remark(std::string("refused: ") + error.what());
   }
 }
 
@@ -226,8 +270,8 @@ void LoopTopics::hear(const TrajectoryMessage& message) {
   const auto trajectory = trajectory_of(message);
   const std::lock_guard lock(mutex_);
   if (trajectory) {
+    want_instead();
     wishes_.trajectory = trajectory;
-    wishes_.set_point.reset();
   } else {
     ++malformed_;
   }

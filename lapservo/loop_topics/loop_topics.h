@@ -31,7 +31,8 @@ struct LoopWishes {
   std::vector<Start> starts;
   std::set<std::string> remarks;             ///< on what did not count, in words
   std::optional<Eigen::Vector4d> set_point;  ///< s_rad, r_px, l_px, d_px
-  std::optional<Trajectory> trajectory;      ///< of time since it is begun; of this and set_point the last
+  std::optional<TipGoal> tip_goal;
+  std::optional<Trajectory> trajectory;  ///< of time since it is begun; of these three the last
 };
 
 /// The loop's topics for those who watch and command it, of the rig's first instrument NAME:
@@ -39,8 +40,10 @@ struct LoopWishes {
 /// /lapservo/NAME/error (JointState: s_rad, r_px, l_px, d_px) every tick; /diagnostics (DiagnosticArray) once a second
 /// and when something changes; /lapservo/NAME/overlay/compressed, drawn in a thread of its own, at most ten a second.
 /// It hears /lapservo/NAME/command (StringStamped: start, start force; any other word stops), /lapservo/NAME/set_point
-/// (JointState: s_rad, r_px, l_px, d_px) and /lapservo/NAME/trajectory (JointTrajectory of these). A start that is
-/// repeated counts once: it would start the arm by itself after each hold.
+/// (JointState: s_rad, r_px, l_px, d_px), /lapservo/NAME/tip_goal (PoseStamped of the tip in the camera's frame; an
+/// orientation of (0, 0, 0, 1), which messages have where nobody sets it, leaves the roll free) and
+/// /lapservo/NAME/trajectory (JointTrajectory of the four, or of x_m, y_m, z_m and roll_rad or without). A start that
+/// is repeated counts once: it would start the arm by itself after each hold.
 class LoopTopics {
  public:
   /// `rcm_moves`: as in FrameTopics. `hears`: whether it hears anything; else it only publishes.
@@ -62,7 +65,10 @@ class LoopTopics {
   void hear(const StringMessage& command);
   void hear_start(const StringMessage& command, bool force);
   void hear(const JointMessage& set_point);
+  void hear(const PlaceMessage& tip_goal);
   void hear(const TrajectoryMessage& trajectory);
+  void want_instead();
+  void remark(const std::string& text);
   void draw();
 
   struct Drawing {

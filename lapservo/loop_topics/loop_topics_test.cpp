@@ -4,6 +4,7 @@
 #include <cmath>
 #include <set>
 #include <thread>
+#include <tuple>
 
 #include <gtest/gtest.h>
 
@@ -191,6 +192,40 @@ TEST(LoopTopics, HearsTrajectories) {
   say({"r_px", "s_rad", "l_px", "d_px"}, points);
   EXPECT_FALSE(topics.wishes().trajectory);
   EXPECT_EQ(topics.malformed(), 9);
+}
+
+TEST(LoopTopics, HearsGoalsOfTheTip) {
+  TestTransport transport;
+  LoopTopics topics(transport, testing::small_test_rig(), {});
+  const auto say = [&](const Eigen::Vector3d& place_m, const Eigen::Quaterniond& turn) {
+    transport.say("/lapservo/PSM1/tip_goal", PlaceMessage{0, {}, {turn, place_m}});
+    return topics.wishes();
+  };
+  const Eigen::Vector3d place_m(0.01, -0.02, 0.12);
+  const Eigen::Quaterniond unset(1, 0, 0, 0), turned(0.6, 0, 0.8, 0);
+  const LoopWishes free = say(place_m, unset), given = say(place_m, turned);
+  ASSERT_TRUE(free.tip_goal && given.tip_goal);
+  EXPECT_EQ(free.tip_goal->position_m, place_m);
+  EXPECT_FALSE(free.tip_goal->camera_from_tip);
+  EXPECT_TRUE(given.tip_goal->camera_from_tip->isApprox(turned));
+  for (const auto& [bad_m, turn, why] : {std::tuple{Eigen::Vector3d(NAN, 0, 0.1), unset, "a finite number"},
+                                         std::tuple{Eigen::Vector3d(10, -20, 120), unset, "looks like millimetres"},
+                                         std::tuple{place_m, Eigen::Quaterniond(0, 0, 0, 0), "a unit quaternion"},
+                                         std::tuple{place_m, Eigen::Quaterniond(NAN, 0, 0, 0), "a unit quaternion"}}) {
+    const LoopWishes none = say(bad_m, turn);
+    EXPECT_FALSE(none.tip_goal);
+    ASSERT_EQ(none.remarks.size(), 1u);
+    EXPECT_NE(none.remarks.begin()->find(why), std::string::npos) << *none.remarks.begin();
+  }
+  using Points = std::vector<TrajectoryMessage::Point>;
+  transport.say("/lapservo/PSM1/tip_goal", PlaceMessage{0, {}, {unset, place_m}});
+  transport.say("/lapservo/PSM1/trajectory",
+                TrajectoryMessage{0, {"x_m", "y_m", "z_m"}, Points{{0, {0, 0, 0.1}}, {2, {0.01, 0, 0.1}}}});
+  const LoopWishes last = topics.wishes();
+  EXPECT_FALSE(last.tip_goal);  // what came last counts
+  ASSERT_TRUE(last.trajectory && last.trajectory->tip_at(2));
+  EXPECT_EQ(last.trajectory->tip_at(2)->position_m, Eigen::Vector3d(0.01, 0, 0.1));
+  EXPECT_EQ(topics.malformed(), 4);
 }
 
 }  // namespace

@@ -88,10 +88,16 @@ void MovingCamera::carry(ImageMeasurement& image, const Rigid3& first_from_camer
   image.ends_px += first->ends_px - there->ends_px;
 }
 
-std::optional<Eigen::Vector4d> MovingCamera::features_in_first(double time_s, const Eigen::Vector4d& desired) {
+std::optional<Rigid3> MovingCamera::camera_from_rcm(double time_s) const {
   const auto first_from_camera = endoscope_.first_from_camera(time_s);
   if (!first_from_camera || !first_from_rcm_) return std::nullopt;
-  const FeatureModel model = feature_model(rig_, first_from_camera->inverse() * *first_from_rcm_);
+  return first_from_camera->inverse() * *first_from_rcm_;
+}
+
+std::optional<Eigen::Vector4d> MovingCamera::features_in_first(double time_s, const Eigen::Vector4d& desired) {
+  const auto here_from_rcm = camera_from_rcm(time_s);
+  if (!here_from_rcm) return std::nullopt;
+  const FeatureModel model = feature_model(rig_, *here_from_rcm);
   const auto found = newton_inverse(model, desired, wanted_, scales_);
   const auto first = found && found->converged ? first_(found->q) : std::nullopt;
   if (!first) return std::nullopt;

@@ -27,6 +27,9 @@ class MovingCamera {
   /// the endoscope's place is not known, or no q shows the goal there, the image is dropped and the goal rests.
   void carry(ServoInput& input, double since_s, const Trajectory& trajectory, const Rigid3& first_from_camera);
 
+  /// The registration of the camera in its place at that time, where both are known.
+  std::optional<Rigid3> camera_from_rcm(double time_s) const;
+
   /// Another registration of the camera in its first place; without one only the marker's pose is carried.
   void use(const std::optional<Rigid3>& first_from_rcm);
 

@@ -7,11 +7,11 @@
 #include <fmt/format.h>
 
 #include "lapservo/control/motion_limits.h"
-#include "lapservo/control/trajectory_check.h"
 #include "lapservo/core/error.h"
-#include "lapservo/servo/image_features.h"
+#include "lapservo/servo/goal_check.h"
 #include "lapservo/servo/moving_camera.h"
 #include "lapservo/servo/servo.h"
+#include "lapservo/servo/tip_goals.h"
 #include "lapservo/servo/track_images.h"
 
 namespace lapservo {
@@ -106,8 +106,8 @@ class FirstSight {
     if (!joints.q.vector().allFinite() || is_on_its_way(joints.blocked) || std::exchange(saw_joints_, true)) return;
     refuse_other_clock("JointState", joints.time_s, tick.input.time_s);
     if (arm.is_simulated() && !joints.follows) return;
-    refuse_infeasible(trajectory_, duration_s_, feature_model(config_.rig), controller_, joints.q,
-                      config_.trajectory_name);
+    refuse_goal(trajectory_, duration_s_, config_.rig, config_.rig.instruments.at(0).camera_from_rcm, controller_,
+                joints, config_.trajectory_name);
   }
 
  private:
@@ -117,6 +117,18 @@ class FirstSight {
   double duration_s_;
   bool saw_joints_ = false, saw_image_ = false;
 };
+
+// Corrects goals of the tip by an image that the loop has used.
+void watch_tip(ControlTick& tick, const Trajectory& trajectory, double start_s,
+               const std::optional<Rigid3>& first_from_rcm, TipGoals& tips) {
+  if (!tick.seen || !first_from_rcm || tick.decision.control.reason != HoldReason::none) return;
+  const ImageMeasurement& image = tick.seen->measurement;
+  if (image.registration != tick.decision.registration) return;
+  tips.see(image, tick.seen->first_from_camera.inverse() * *first_from_rcm);
+  const double exposed_s = image.time_s - tick.decision.control.delay_s;
+  const auto goal = trajectory.tip_at(exposed_s - start_s);
+  if (goal && image.found) tick.tip_error_px = tips.error_px(image, *goal, exposed_s - tick.input.time_s);
+}
 
 }  // namespace
 
@@ -133,6 +145,11 @@ void run(Supervisor& arm, ImageStream& images, Clock& clock, const RunConfig& co
   if (config.arm_limits) controller.limits = *config.arm_limits;
   std::optional<MovingCamera> moving;
   if (config.endoscope) moving.emplace(*config.endoscope, config.rig, controller.scales), controller.window.reset();
+  TipGoals tips(config.rig, controller.scales);
+  if (trajectory.tip_at(0)) tips.refuse_incomplete(config.trajectory_name, false);
+  const Trajectory features = tips.features_of(trajectory);
+  std::optional<Rigid3> first_from_rcm =
+      config.rig.instruments.at(0).camera_from_rcm;  // of the camera in its first place
   FirstSight first_sight(config, controller, trajectory, duration_s);
   Servo servo(controller, config.rig);
   const auto vision =
@@ -149,20 +166,25 @@ void run(Supervisor& arm, ImageStream& images, Clock& clock, const RunConfig& co
     tick.input.readings = arm.readings();
     tick.input.joints = arm.state();
     const double since_s = tick.input.time_s - start_s;
-    tick.input.desired = trajectory.at(since_s);
+    tips.follow(tick.input.joints);
+    if (moving) tips.use(moving->camera_from_rcm(tick.input.time_s));
+    tick.input.desired = features.at(since_s);
     first_sight.check(tick, arm);
     if (tick.seen) tick.input.image = tick.seen->measurement;
     if (moving) {
       vision->set_delay(servo.controller().delay_s());
-      moving->carry(tick.input, since_s, trajectory, tick.seen ? tick.seen->first_from_camera : Rigid3());
+      moving->carry(tick.input, since_s, features, tick.seen ? tick.seen->first_from_camera : Rigid3());
     }
     tick.decision = servo.step(tick.input);
     if (tick.decision.send) arm.send(servo.path());
     if (tick.decision.release) arm.release();
     tell(arm, tick.decision);
+    watch_tip(tick, trajectory, start_s, first_from_rcm, tips);
     if (tick.decision.registration != registration) {
       registration = tick.decision.registration;
       vision->use(tick.decision);
+      first_from_rcm = tick.decision.camera_from_rcm;
+      tips.use(first_from_rcm);
       if (moving) moving->use(tick.decision.camera_from_rcm);
     }
     withhold_contradicted(tick);

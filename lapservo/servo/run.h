@@ -39,6 +39,8 @@ struct ControlTick {
   ServoInput input;
   ServoDecision decision;
   std::optional<TrackedImage> seen;  ///< without q and r where the joints contradict them
+  /// Where a goal of the tip was pursued when `seen` was exposed: the seen tip beside it, ideal pixels.
+  std::optional<Eigen::Vector2d> tip_error_px{};
 };
 
 /// Receives every tick after its setpoints were sent, in the loop's thread: a long computation here only delays the
@@ -62,7 +64,10 @@ class RunObserver {
 /// duration or a clock's time that is not finite; for joints or a first image stamped more than a second ahead of the
 /// clock; and, as soon as the joints of an arm that is enabled, homed and not busy are known, for a trajectory that
 /// can't be followed from there (refuse_infeasible()), unless nothing is moved: the arm is simulated and does not
-/// follow.
+/// follow; or for a goal of the tip that can't be reached, with the nearest place that can.
+///
+/// A goal of the tip needs the rig's camera_from_rcm and tool. Across the line of sight the image closes it: in steady
+/// state the image of the tip, by the seen marker, lies on the goal's. Along it, in depth, the registration counts.
 void run(Supervisor& arm, ImageStream& images, Clock& clock, const RunConfig& config, const Trajectory& trajectory,
          double duration_s, RunObserver& observer);
 

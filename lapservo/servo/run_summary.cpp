@@ -1,5 +1,6 @@
 #include "lapservo/servo/run_summary.h"
 
+#include <cmath>
 #include <limits>
 
 #include <Eigen/Geometry>
@@ -69,6 +70,7 @@ void RunSummary::add(const ControlTick& tick, const std::optional<InstrumentTrut
     error.setConstant(std::numeric_limits<double>::infinity());  // not known, and so not small
   }
   convergence_.add(tick.input.time_s - *start_s_, error, holds);
+  if (converged() && tick.tip_error_px) tip_squares_px2_ += tick.tip_error_px->squaredNorm(), ++tip_images_;
 }
 
 std::string RunSummary::convergence_text() const {
@@ -77,9 +79,12 @@ std::string RunSummary::convergence_text() const {
   const Eigen::Vector4d rms = convergence_.rms_since();
   const long held = convergence_.held_since();
   return fmt::format(
-      "within 1 px and 5 mrad from {:.2f} s on; rms since{}: s {:.2f} mrad, r {:.2f}, l {:.2f}, d {:.2f} px",
+      "within 1 px and 5 mrad from {:.2f} s on; rms since{}: s {:.2f} mrad, r {:.2f}, l {:.2f}, d {:.2f} px{}",
       *reached_s, held > 0 ? fmt::format(" while it tracked (held for {} ticks)", held) : "", 1000 * rms[0], rms[1],
-      rms[2], rms[3]);
+      rms[2], rms[3],
+      tip_images_ > 0 ? fmt::format("; the seen tip {:.2f} px from its goal",
+                                    std::sqrt(tip_squares_px2_ / static_cast<double>(tip_images_)))
+                      : "");
 }
 
 std::string RunSummary::holds_text() const {

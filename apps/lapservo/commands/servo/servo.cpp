@@ -29,6 +29,7 @@
 #include "lapservo/servo/replay.h"
 #include "lapservo/servo/run.h"
 #include "lapservo/servo/servo_log.h"
+#include "lapservo/servo/tip_goals.h"
 #include "lapservo/sim/simulator.h"
 #include "recordings/open_bag.h"
 
@@ -50,8 +51,10 @@ JointVector joints_at_start(const ServoOptions& options, const Trajectory& traje
                             const FeatureModel& true_model, const Eigen::Vector4d& joint_offset) {
   if (!options.start.empty()) return JointVector::from_vector(four(options.start));
   Random random(options.seed);
-  return random_start(trajectory, duration_s(options), true_model, run.controller, joint_offset, random,
-                      run.trajectory_name);
+  TipGoals tips(run.rig, run.controller.scales);
+  if (trajectory.tip_at(0)) tips.refuse_incomplete(run.trajectory_name, true);
+  return random_start(tips.features_of(trajectory), duration_s(options), true_model, run.controller, joint_offset,
+                      random, run.trajectory_name);
 }
 
 class SimulationWatcher : public RunWatcher {
@@ -193,11 +196,20 @@ void add_arm_options(Command command, ServoOptions& options) {
 void add_trajectory_options(Command command, ServoOptions& options) {
   command.add_option(
       "--trajectory", options.trajectory,
-      "paper: section V-D's sinusoids, omega 0.5 read in rad/s; or a CSV of time_s,s_rad,r_px,l_px,d_px");
+      "paper: section V-D's sinusoids, omega 0.5 read in rad/s; or a CSV of time_s,s_rad,r_px,l_px,d_px, or of the "
+      "tip: time_s,x_m,y_m,z_m with roll_rad or without");
   command.add_option("--set-point", options.set_point, "Instead: s_rad,r_px,l_px,d_px to reach and keep")
       .finite_number()
       .delimiter(',')
       .expected(4);
+  command
+      .add_option(
+          "--tip", options.tip,
+          "Instead: x,y,z or x,y,z,roll of the tip in the camera's frame, metres and rad, to reach and keep, by "
+          "the rig's camera_from_rcm and tool. The image closes it across the line of sight; in depth the rig "
+          "counts. roll is psi; without it the roll stays")
+      .finite_number()
+      .delimiter(',');
   command
       .add_option("--via", options.via,
                   "Instead: points s_rad,r_px,l_px,d_px,s_rad,... to pass, a second at rest in each")
@@ -285,6 +297,7 @@ void add_servo(Command app, Run& run_later) {
       "Examples:\n"
       "  lapservo servo --rig configs/paper.yaml --robot sim --out run\n"
       "  lapservo servo --rig configs/paper.yaml --robot sim --set-point 0.9,795,365,212 --hide 3,4 --web\n"
+      "  lapservo servo --rig rig.yaml --robot sim --tip 0.005,0.01,0.12\n"
       "  lapservo servo --rig configs/paper.yaml --robot ros2:PSM1 --camera /dev/video0 --web\n"
       "  lapservo servo --replay run/log.csv\n"
       "  lapservo servo --replay swing.bag --rig rig.yaml --out decided");

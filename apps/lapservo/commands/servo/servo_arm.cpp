@@ -17,7 +17,6 @@
 #include "apps/lapservo/commands/servo/run_watcher.h"
 #include "apps/lapservo/inputs/live_images.h"
 #include "apps/lapservo/inputs/transports.h"
-#include "lapservo/control/trajectory_check.h"
 #include "lapservo/core/error.h"
 #include "lapservo/crtk/arm_pose.h"
 #include "lapservo/crtk/crtk_robot.h"
@@ -27,7 +26,7 @@
 #include "lapservo/robot/real_time.h"
 #include "lapservo/robot/steady_clock.h"
 #include "lapservo/robot/supervisor.h"
-#include "lapservo/servo/image_features.h"
+#include "lapservo/servo/goal_check.h"
 
 namespace lapservo::app {
 using namespace internal;
@@ -53,7 +52,8 @@ class Goal {
  public:
   explicit Goal(Trajectory trajectory) : trajectory_(std::make_shared<Trajectory>(std::move(trajectory))) {}
   Trajectory trajectory() const {
-    return {0, [current = trajectory_](double time_s) { return current->at(time_s); }};
+    return {0, [current = trajectory_](double time_s) { return current->at(time_s); },
+            [current = trajectory_](double time_s) { return current->tip_at(time_s); }};
   }
   void replace(Trajectory trajectory) { *trajectory_ = std::move(trajectory); }
 
@@ -100,6 +100,7 @@ class ArmWatcher : public RunWatcher {
     for (const std::string& remark : wishes.remarks)
       if (said_remarks_.size() < most_said && said_remarks_.insert(remark).second) say(time_s, remark);
     if (wishes.set_point) wanted_ = Wanted{"set_point", 1, set_point(*wishes.set_point)};
+    if (wishes.tip_goal) wanted_ = Wanted{"tip_goal", 0, tip_set_point(*wishes.tip_goal, "tip_goal")};
     if (wishes.trajectory) wanted_ = Wanted{"trajectory", wishes.trajectory->duration_s, *wishes.trajectory};
     const ServoDecision& decision = tick.decision;
     if (refusal_.valid() && refusal_.wait_for(std::chrono::seconds(0)) == std::future_status::ready) {
@@ -117,10 +118,9 @@ class ArmWatcher : public RunWatcher {
     // A long trajectory takes longer to walk along than a tick has.
     refusal_ = std::async(
         std::launch::async,
-        [this, wanted = asked_, q = tick.input.joints.q, camera_from_rcm = decision.camera_from_rcm]() -> std::string {
+        [this, wanted = asked_, joints = tick.input.joints, rcm = decision.camera_from_rcm]() -> std::string {
           try {
-            const FeatureModel model = camera_from_rcm ? feature_model(run_.rig, *camera_from_rcm) : FeatureModel();
-            refuse_infeasible(wanted.trajectory, wanted.duration_s, model, run_.controller, q, wanted.name);
+            refuse_goal(wanted.trajectory, wanted.duration_s, run_.rig, rcm, run_.controller, joints, wanted.name);
           } catch (const InputError& error) {
             return error.what();
           }
@@ -129,8 +129,11 @@ class ArmWatcher : public RunWatcher {
   }
   void begin_or_refuse(const std::string& refusal, double time_s) {
     if (!refusal.empty()) return say(time_s, "refused: " + refusal);
-    goal_.replace({0, [at = asked_.trajectory.at, time_s](double now_s) { return at(now_s - time_s); }});
-    say(time_s, std::string("a ") + (asked_.name == "set_point" ? "setpoint" : "trajectory") + " came");
+    goal_.replace({0, [at = asked_.trajectory.at, time_s](double now_s) { return at(now_s - time_s); },
+                   [asked = asked_.trajectory, time_s](double now_s) { return asked.tip_at(now_s - time_s); }});
+    const std::string& name = asked_.name;
+    const char* kind = name == "tip_goal" ? "goal of the tip" : name == "set_point" ? "setpoint" : "trajectory";
+    say(time_s, std::string("a ") + kind + " came");
   }
   void say_images(double time_s) {
     if (const auto ended = images_.ended(); ended && !said_ended_) {
@@ -204,6 +207,8 @@ std::string wait_for_topics(const ServoOptions& options, Transports& transports,
 InterlockConfig interlock_of(const ServoOptions& options, const RunConfig& config) {
   InterlockConfig interlock;
   interlock.joints = joints_of(options, config.rig);
+  if (const auto& tool = config.rig.instruments.front().tool)
+    for (const WristJoint& joint : tool->wrist) interlock.wrist.push_back(joint.name);
   interlock.limits = config.controller.limits;
   interlock.motion_enabled = options.enable_motion;
   interlock.max_readers = static_cast<std::size_t>(options.setpoint_readers);

@@ -100,8 +100,15 @@ std::vector<Eigen::Vector4d> points_of(const std::vector<double>& numbers) {
   return points;
 }
 
+TipGoal tip_of(const std::vector<double>& numbers) {
+  if (numbers.size() != 3 && numbers.size() != 4)
+    throw InputError("--tip", fmt::format("holds {} numbers, expected x,y,z or x,y,z,roll", numbers.size()));
+  return {Eigen::Vector3d(numbers.data()), numbers.size() == 4 ? std::optional(numbers[3]) : std::nullopt};
+}
+
 std::string trajectory_name(const ServoOptions& options) {
   if (!options.set_point.empty()) return "--set-point";
+  if (!options.tip.empty()) return "--tip";
   return options.via.empty() ? options.trajectory : "--via";
 }
 
@@ -132,6 +139,7 @@ const Joints& joints_of(const ServoOptions& options, const Rig& rig) {
 
 Trajectory trajectory_of(const ServoOptions& options) {
   if (!options.set_point.empty()) return set_point(four(options.set_point));
+  if (!options.tip.empty()) return tip_set_point(tip_of(options.tip), "--tip");
   if (!options.via.empty()) return via_points(points_of(options.via), via_rate, via_dwell_s);
   if (options.trajectory == "paper") return sinusoids(paper_sinusoids());
   return trajectory_from_csv(options.trajectory);

@@ -21,7 +21,7 @@ struct ServoOptions {
   std::string rig, robot, instrument, camera, joint_limits,
       trajectory = "paper", method = "default", tracker, controller, delay = "estimate", out, replay, joint_topic,
       control = "both", operator_present, endoscope, frames = default_frames;
-  std::vector<double> set_point, via, start, rcm_px, hide;
+  std::vector<double> set_point, tip, via, start, rcm_px, hide;
   std::vector<double> registration_error;  // 3 x mm
   double latency_ms = 80;
   std::optional<double> duration;  // s

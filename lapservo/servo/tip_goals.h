@@ -1,0 +1,75 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "lapservo/control/controller_config.h"
+#include "lapservo/control/image_measurement.h"
+#include "lapservo/control/trajectory.h"
+#include "lapservo/rig/rig.h"
+#include "lapservo/robot/robot.h"
+
+namespace lapservo::internal {
+
+/// Turns goals of the tip into the features of the configuration that holds the tip there, by camera_from_rcm and by
+/// the tool as its wrist is and moves now. The image removes errors of the registration: the tip by the seen marker
+/// lies beside the tip by the measured features and the registration, and the goal is moved by that the other way, at
+/// its depth. The law brings the features to the desired ones; then the tip's image lies on that of the goal, whatever
+/// the registration. The depth along the line of sight stays as the registration has it.
+class TipGoals {
+ public:
+  /// Goals of the tip need the first instrument's camera_from_rcm and its tool with a place; others pass unchanged.
+  TipGoals(const Rig& rig, const Scales& scales);
+
+  /// Throws InputError, naming `source`, where the rig, or the arm's measured joints, lack what a goal of the tip
+  /// needs.
+  void refuse_incomplete(const std::string& source, bool has_joints) const;
+
+  /// The same trajectory in features, by all that is known at each call; refers to this. Where no configuration
+  /// holds the tip at the goal, the features rest where they were, and are NaN before the first.
+  Trajectory features_of(const Trajectory& goal);
+
+  /// A state of the joints: where the wrist is, how it moves; the psi of a roll that is free until an image has it.
+  void follow(const JointState& joints);
+  /// The registration from now on; nullopt while it is measured anew.
+  void use(const std::optional<Rigid3>& camera_from_rcm);
+  /// An image that the loop has used, taken with that registration.
+  void see(const ImageMeasurement& image, const Rigid3& camera_from_rcm);
+
+  /// The configuration for a goal, corrected by the images, with the wrist as it is after `ahead_s`.
+  std::optional<JointVector> configuration(const TipGoal& goal, double ahead_s = 0) const;
+  /// Where the registration has the tip.
+  std::optional<Eigen::Vector3d> tip_at(const JointVector& q) const;
+  /// The seen tip beside a goal, in ideal pixels, by an image that was exposed after `ahead_s`, below 0.
+  std::optional<Eigen::Vector2d> error_px(const ImageMeasurement& image, const TipGoal& goal, double ahead_s) const;
+
+ private:
+  std::optional<DesiredFeatures> desired(const Trajectory& goal, double time_s) const;
+  std::optional<Rigid3> marker_from_tip(double ahead_s) const;
+  void follow_wrist(const std::vector<double>& now_rad, double time_s);
+  void keep_psi(double psi_rad);
+
+  Rig rig_;
+  Scales scales_;
+  std::optional<Rigid3> camera_from_rcm_;
+  FeatureModel model_;
+  Eigen::Vector4d q_ = Eigen::Vector4d::Zero();  ///< measured
+  struct WristMotion {
+    double rad = 0;  ///< as it was read last
+    double smooth_rad = 0, rad_s = 0, rad_s2 = 0;
+  };
+  std::vector<WristMotion> wrist_;
+  double wrist_s_ = 0;       ///< when the wrist was there
+  bool tip_wanted_ = false;  ///< by the goal of the last call
+  double psi_rad_ = 0;       ///< of a roll that is free
+  enum class PsiBy { joints, image, goal } psi_by_ = PsiBy::joints;
+  Eigen::Vector2d off_px_ = Eigen::Vector2d::Zero();  ///< the seen tip beside the registration's
+  std::optional<double> corrected_s_;                 ///< by the image of that stamp
+  int registration_ = 0;                              ///< of that image
+  DesiredFeatures last_;
+};
+
+}  // namespace lapservo::internal

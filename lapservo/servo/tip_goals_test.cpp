@@ -1,0 +1,280 @@
+#include "lapservo/servo/tip_goals.h"
+
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/core/random.h"
+#include "lapservo/geometry/rotation.h"
+#include "lapservo/kinematics/tip_kinematics.h"
+#include "lapservo/servo/goal_check.h"
+#include "lapservo/servo/image_features.h"
+#include "lapservo/servo/image_window.h"
+#include "lapservo/testing/input_error.h"
+#include "lapservo/testing/rigs.h"
+#include "lapservo/tool/test_tools.h"
+
+namespace lapservo::internal {
+namespace {
+
+const JointVector there{0.05, 1.57, 0.064, 1.2};
+
+// A rod that ends behind the marker.
+Tool straight_tool() {
+  Tool tool;
+  tool.place.emplace().base_in_marker_m = {0, 0, 0.045};
+  return tool;
+}
+
+Rig rig_with(const Tool& tool) {
+  Rig rig = testing::paper_test_rig();
+  rig.instruments[0].tool = tool;
+  return rig;
+}
+
+JointState joints_at(double time_s, const JointVector& q, std::vector<double> wrist_rad = {}) {
+  JointState joints;
+  joints.time_s = time_s;
+  joints.q = q;
+  joints.wrist_rad = std::move(wrist_rad);
+  return joints;
+}
+
+// Where things are, beside what the rig says.
+struct Truth {
+  Rig rig;
+
+  Rigid3 camera_from_marker(const JointVector& q) const {
+    return marker_pose_at(*rig.instruments[0].camera_from_rcm, rig.instruments[0].marker, q);
+  }
+  Eigen::Vector3d tip_at(const JointVector& q, const std::vector<double>& wrist_rad) const {
+    return camera_from_marker(q) * tip_in_marker(*rig.instruments[0].tool, wrist_rad).marker_from_tip.translation;
+  }
+  // As a perfect tracker with the registration of `known` would measure it.
+  ImageMeasurement image_of(const JointVector& q, double time_s, const Rig& known) const {
+    ImageMeasurement image;
+    image.found = true;
+    image.time_s = time_s;
+    image.features = feature_model(rig)(q.vector()).value().features;
+    // r counts from where the rig has the RCM.
+    const Eigen::Vector2d e0_px = feature_model(rig)(q.vector()).value().ends_px.head<2>();
+    image.features[1] = (e0_px - rcm_image_px(known, std::nullopt).value()).norm();
+    image.camera_from_marker = camera_from_marker(q);
+    return image;
+  }
+};
+
+Truth misregistered(const Rig& rig, Random& random) {
+  const auto direction = [&] {
+    return Eigen::Vector3d(random.normal(), random.normal(), random.normal()).normalized();
+  };
+  Truth truth{rig};
+  Rigid3& camera_from_rcm = *truth.rig.instruments[0].camera_from_rcm;
+  camera_from_rcm.translation += 1e-3 * direction();
+  camera_from_rcm.rotation = rotation_by(5e-3 * direction()) * camera_from_rcm.rotation;
+  return truth;
+}
+
+// Without any correction, and where registration and truth are one.
+TEST(TipGoals, FeaturesAreThoseOfTheConfigurationThatHoldsTheTipThere) {
+  Random random(81);
+  for (const Tool& tool : {straight_tool(), placed_tool()}) {
+    const Rig rig = rig_with(tool);
+    const std::vector<double> wrist_rad(tool.wrist.size(), 0.4);
+    for (int trial = 0; trial < 20; ++trial) {
+      TipGoals tips(rig, {});
+      const JointVector q = JointVector::from_vector(
+          there.vector() +
+          Eigen::Vector4d(0.03, 0.03, 0.004, 0.5)
+              .cwiseProduct(Eigen::Vector4d(random.normal(), random.normal(), random.normal(), random.normal())));
+      const Eigen::Vector3d tip_m = Truth{rig}.tip_at(q, wrist_rad);
+      tips.follow(joints_at(0, q, wrist_rad));
+      for (const auto& roll_rad : {std::optional<double>(), std::optional(q.psi_rad)}) {
+        const Trajectory features = tips.features_of(tip_set_point({tip_m, roll_rad}, ""));
+        const DesiredFeatures desired = features.at(1);
+        EXPECT_LT((desired.features - feature_model(rig)(q.vector())->features).norm(), 1e-6) << trial;
+        EXPECT_LT(desired.rate.norm() + desired.acceleration.norm(), 1e-6);
+      }
+    }
+  }
+}
+
+TEST(TipGoals, RatesAreTheDerivativesOfTheFeatures) {
+  const Rig rig = rig_with(straight_tool());
+  TipGoals tips(rig, {});
+  tips.follow(joints_at(0, there));
+  const Eigen::Vector3d centre_m = *tips.tip_at(there);
+  const Trajectory circle = tips.features_of(
+      {0, {}, [&](double t) {
+         return TipGoal{centre_m + 0.005 * Eigen::Vector3d(std::cos(t), std::sin(t), 0), 1.2 + 0.2 * std::sin(t)};
+       }});
+  constexpr double h = 1e-3;
+  for (double t = 0; t < 6; t += 0.37) {
+    const DesiredFeatures now = circle.at(t), before = circle.at(t - h), after = circle.at(t + h);
+    const Eigen::Vector4d unit(0.001, 1, 1, 1);
+    EXPECT_LT(((after.features - before.features) / (2 * h) - now.rate).cwiseQuotient(unit).norm(), 0.05) << t;
+    EXPECT_LT(((after.rate - before.rate) / (2 * h) - now.acceleration).cwiseQuotient(unit).norm(), 0.2) << t;
+  }
+}
+
+// Whatever the registration is off by: where the image shows the desired features, the true tip lies on its goal in the
+// image.
+TEST(TipGoals, TheImageClosesWhatTheRegistrationIsOffBy) {
+  constexpr std::uint64_t seed = 82;
+  Random random(seed);
+  for (int trial = 0; trial < 20; ++trial) {
+    const Tool tool = trial % 2 ? straight_tool() : placed_tool();
+    const Rig rig = rig_with(tool);
+    const std::vector<double> wrist_rad(tool.wrist.size(), 0.4);
+    const Truth truth = misregistered(rig, random);
+    TipGoals tips(rig, {});
+    JointVector q = there;
+    const TipGoal goal{truth.tip_at(q, wrist_rad) + 0.003 * Eigen::Vector3d(random.normal(), random.normal(), 0)};
+    const Trajectory features = tips.features_of(tip_set_point(goal, ""));
+    const auto off_px = [&] {
+      return (rig.camera.ideal_from_point(truth.tip_at(q, wrist_rad)) - rig.camera.ideal_from_point(goal.position_m))
+          .norm();
+    };
+    // The law brings the seen features to the desired ones.
+    double first_px = 0;
+    for (int k = 0; k < 60; ++k) {
+      const double time_s = k / 30.0;
+      tips.follow(joints_at(time_s, q, wrist_rad));
+      const DesiredFeatures desired = features.at(time_s);
+      for (int i = 0; i < 5; ++i) {
+        const Eigen::Vector4d left = desired.features - truth.image_of(q, 0, rig).features;
+        q = JointVector::from_vector(q.vector() + feature_model(rig)(q.vector())->jacobian.inverse() * left);
+      }
+      if (k == 0) first_px = off_px();
+      tips.see(truth.image_of(q, time_s, rig), *rig.instruments[0].camera_from_rcm);
+    }
+    EXPECT_GT(first_px, 0.3) << "seed " << seed << ", trial " << trial;
+    EXPECT_LT(off_px(), 0.02) << "seed " << seed << ", trial " << trial << ", first " << first_px;
+  }
+}
+
+// The same place, while the wrist moves: the features move with it.
+TEST(TipGoals, FollowTheWrist) {
+  const Rig rig = rig_with(placed_tool());
+  const FeatureModel model = feature_model(rig);
+  TipGoals tips(rig, {});
+  std::optional<Trajectory> features;
+  Eigen::Vector3d goal_m;
+  for (int k = 0; k <= 120; ++k) {
+    const double time_s = k / 120.0;
+    const std::vector<double> wrist_rad{0.2 + 0.5 * time_s, -0.1};
+    tips.follow(joints_at(time_s, there, wrist_rad));
+    if (k == 0) goal_m = Truth{rig}.tip_at(there, wrist_rad), features = tips.features_of(tip_set_point({goal_m}, ""));
+    const DesiredFeatures now = features->at(time_s);
+    const auto q = tips.configuration({goal_m});
+    ASSERT_TRUE(q);
+    EXPECT_LT((Truth{rig}.tip_at(*q, wrist_rad) - goal_m).norm(), 1e-12);
+    EXPECT_LT((model(q->vector())->features - now.features).norm(), 1e-9);
+    if (k < 60) continue;
+    tips.follow(joints_at(time_s, there, {wrist_rad[0] + 0.5 * 1e-3, -0.1}));  // no later: it does not count
+    const auto later = tips.configuration({goal_m}, 1e-3);
+    const Eigen::Vector4d rate = (model(later->vector())->features - now.features) / 1e-3;
+    EXPECT_LT((rate - now.rate).cwiseQuotient(Eigen::Vector4d(1e-3, 1, 1, 1)).norm(), 0.3);
+    EXPECT_GT(now.rate.norm(), 5);
+  }
+}
+
+TEST(TipGoals, AFreeRollStaysWhereTheImageHasIt) {
+  const Rig rig = rig_with(straight_tool());
+  TipGoals tips(rig, {});
+  JointVector misread = there;
+  misread.psi_rad += 0.2 + two_pi;  // the arm's roll is not the image's, and a turn farther
+  const Trajectory features = tips.features_of(tip_set_point({Truth{rig}.tip_at(there, {})}, ""));
+  for (int k = 0; k < 5; ++k) {
+    tips.follow(joints_at(k, misread));
+    features.at(k);
+    tips.see(Truth{rig}.image_of(there, k, rig), *rig.instruments[0].camera_from_rcm);
+  }
+  JointVector turned = there;
+  turned.psi_rad += 0.1;  // a disturbance: the roll does not give way to it
+  tips.see(Truth{rig}.image_of(turned, 6, rig), *rig.instruments[0].camera_from_rcm);
+  EXPECT_NEAR(tips.configuration({Truth{rig}.tip_at(there, {})})->psi_rad, there.psi_rad + two_pi, 1e-6);
+}
+
+class Refusals : public ::testing::Test {
+ protected:
+  Refusals() {
+    controller.window = image_window(rig.camera, 20);
+    joints.follows = true;
+  }
+  std::string refused(const TipGoal& goal) const {
+    return testing::input_error([&] {
+      refuse_goal({0, {}, [goal](double) { return goal; }}, 1, rig, rig.instruments[0].camera_from_rcm, controller,
+                  joints, "--tip");
+    });
+  }
+  static std::optional<Eigen::Vector3d> nearest_in(const std::string& text) {
+    constexpr std::string_view begin = "reached is ";
+    const std::size_t at = text.find(begin);
+    Eigen::Vector3d place;
+    if (at == std::string::npos ||
+        std::sscanf(text.c_str() + at + begin.size(), "%lf,%lf,%lf", &place[0], &place[1], &place[2]) != 3)
+      return std::nullopt;
+    return place;
+  }
+
+  Rig rig = rig_with(straight_tool());
+  ControllerConfig controller;
+  JointState joints = joints_at(0, there);
+  Eigen::Vector3d here_m = Truth{rig}.tip_at(there, {});
+};
+
+TEST_F(Refusals, NothingInReachIsRefused) {
+  EXPECT_EQ(refused({here_m}), "");
+  EXPECT_EQ(refused({here_m + Eigen::Vector3d(0.004, -0.003, 0.005)}), "");
+  EXPECT_EQ(refused({here_m, there.psi_rad + 0.3}), "");
+}
+
+// In words, with the nearest place, which is not refused, and to which no other is much nearer.
+TEST_F(Refusals, GoalsOutOfReachHaveTheNearestThatIsNot) {
+  const JointLimits& limits = controller.limits;
+  JointVector deep = there;
+  deep.rho_m = limits.upper[2] + 0.02;
+  struct {
+    TipGoal goal;
+    std::string why;
+  } const goals[] = {{{Truth{rig}.tip_at(deep, {})}, "limits.upper rho_m"},
+                     {{{0.01, 0.01, -0.1}}, "lies behind the camera"},
+                     {{{0.3, 0, 0.15}}, ""},
+                     {{here_m, limits.upper[3] + 0.2}, "limits.upper psi_rad"},
+                     {{rig.instruments[0].camera_from_rcm->translation}, "too near to the RCM"}};
+  Random random(83);
+  for (const auto& [goal, why] : goals) {
+    const std::string text = refused(goal);
+    SCOPED_TRACE(text);
+    EXPECT_NE(text.find("--tip: can't be followed at 0.00 s: "), std::string::npos);
+    EXPECT_NE(text.find(why), std::string::npos);
+    const auto nearest = nearest_in(text);
+    ASSERT_TRUE(nearest);
+    const double away_m = (*nearest - goal.position_m).norm();
+    TipGoal moved = goal;
+    if (goal.roll_rad) moved.roll_rad = limits.upper[3];
+    int nearer = 0;
+    for (int i = 0; i < 60; ++i) {
+      const Eigen::Vector3d by(random.normal(), random.normal(), random.normal());
+      moved.position_m = *nearest + 0.003 * by;
+      nearer += (moved.position_m - goal.position_m).norm() < away_m - 3e-4 && refused(moved).empty();
+    }
+    EXPECT_EQ(nearer, 0);
+  }
+  EXPECT_EQ(nearest_in(refused({{std::numeric_limits<double>::quiet_NaN(), 0, 0.1}})), std::nullopt);
+  EXPECT_NE(refused({{std::numeric_limits<double>::quiet_NaN(), 0, 0.1}}).find("not finite"), std::string::npos);
+}
+
+TEST_F(Refusals, SayWhatIsMissing) {
+  rig.instruments[0].tool = placed_tool();
+  EXPECT_NE(refused({here_m}).find("the arm does not measure wrist_pitch, wrist_yaw"), std::string::npos);
+  rig.instruments[0].tool.reset();
+  EXPECT_NE(refused({here_m}).find("`tool`"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace lapservo::internal
