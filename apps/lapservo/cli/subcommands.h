@@ -12,6 +12,7 @@ void add_calibrate_camera(Command calibrate, Run& run);
 void add_calibrate_colour(Command calibrate, Run& run);
 void add_calibrate_marker(Command calibrate, Run& run);
 void add_calibrate_registration(Command calibrate, Run& run);
+void add_calibrate_tip(Command calibrate, Run& run);
 void add_check(Command app, Run& run);
 void add_estimate_rcm(Command app, Run& run);
 void add_experiment(Command app, Run& run);

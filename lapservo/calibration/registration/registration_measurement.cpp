@@ -10,6 +10,7 @@
 #include "lapservo/calibration/check/frame_diagnosis.h"
 #include "lapservo/core/csv.h"
 #include "lapservo/core/error.h"
+#include "lapservo/core/rounded_covariance.h"
 #include "lapservo/core/rounded_sigma.h"
 #include "lapservo/rig/registration_covariance.h"
 #include "lapservo/vision/tracker.h"
@@ -98,22 +99,6 @@ MeasuredPoses poses_in_table(const std::filesystem::path& path, const std::strin
   return poses;
 }
 
-namespace {
-
-// To four digits. Correlations are 0.4 % smaller, so that no
-// rounding makes a variance negative.
-Eigen::Matrix<double, 6, 6> written_covariance(const Registration& registration) {
-  constexpr double of_correlations = 0.996;
-  Eigen::Matrix<double, 6, 6> covariance =
-      in_camera_axes(registration.camera_from_rcm, registration.arm->covariance.topLeftCorner<6, 6>());
-  const Eigen::Matrix<double, 6, 1> variances = covariance.diagonal();
-  covariance *= of_correlations;
-  covariance.diagonal() = variances;
-  return covariance.unaryExpr([](double number) { return parse_finite(fmt::format("{:.4g}", number)).value(); });
-}
-
-}  // namespace
-
 Instrument registered(Instrument instrument, const Registration& registration) {
   instrument.camera_from_rcm = registration.camera_from_rcm;
   instrument.sigma_translation_m = rounded_sigmas<3>(registration.sigma_translation_m);
@@ -122,7 +107,8 @@ Instrument registered(Instrument instrument, const Registration& registration) {
     instrument.sigma_quaternion_xyzw = rounded_sigmas<4>(*registration.sigma_quaternion);
   instrument.registration_covariance.reset();
   if (!registration.arm) return instrument;
-  instrument.registration_covariance = written_covariance(registration);
+  instrument.registration_covariance = rounded_covariance(
+      in_camera_axes(registration.camera_from_rcm, registration.arm->covariance.topLeftCorner<6, 6>()));
   instrument.joints = registration.arm->joints;
   instrument.joints->sigma_offset = rounded_sigmas<4>(registration.arm->sigma_offset);
   instrument.image_delay_s = registration.arm->image_delay_s;

@@ -11,12 +11,14 @@ void add_calibrate(Command app, Run& run_later) {
       "  lapservo calibrate camera boards/ --board 9x6 --square-mm 5 --rig rig.yaml\n"
       "  lapservo calibrate colour motion.mp4 --rig rig.yaml --out rig.yaml\n"
       "  lapservo calibrate marker turn.mp4 --rig rig.yaml --out rig.yaml\n"
-      "  lapservo calibrate registration swing.mp4 --joints joints.csv --rig rig.yaml --out rig.yaml");
+      "  lapservo calibrate registration swing.mp4 --joints joints.csv --rig rig.yaml --out rig.yaml\n"
+      "  lapservo calibrate tip --pivot pivot.mp4 --rig rig.yaml --out rig.yaml");
   add_calibrate_all(calibrate, run_later);
   add_calibrate_camera(calibrate, run_later);
   add_calibrate_colour(calibrate, run_later);
   add_calibrate_marker(calibrate, run_later);
   add_calibrate_registration(calibrate, run_later);
+  add_calibrate_tip(calibrate, run_later);
 }
 
 }  // namespace lapservo::app

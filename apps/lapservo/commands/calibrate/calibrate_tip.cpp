@@ -1,0 +1,152 @@
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "apps/lapservo/cli/interrupt.h"
+#include "apps/lapservo/cli/subcommands.h"
+#include "apps/lapservo/commands/calibrate/calibrate_steps.h"
+#include "apps/lapservo/inputs/frame_input.h"
+#include "lapservo/calibration/camera/camera_measurement.h"
+#include "lapservo/calibration/registration/registration_measurement.h"
+#include "lapservo/calibration/tip/tip_ways.h"
+#include "lapservo/calibration/tip/tool_place.h"
+#include "lapservo/calibration/tip/touch_measurement.h"
+#include "lapservo/core/angles.h"
+#include "lapservo/core/atomic_file.h"
+#include "lapservo/core/csv.h"
+#include "lapservo/core/error.h"
+#include "lapservo/core/rounded_covariance.h"
+#include "lapservo/core/statistics.h"
+#include "lapservo/rig/rig_writer.h"
+
+namespace lapservo::app {
+using namespace internal;
+namespace {
+
+struct CalibrateTipOptions : CalibrateOptions {
+  std::string pivot, touches, calliper, board, dictionary;
+  std::optional<double> square_mm, marker_mm;
+};
+
+TipCalibration by_pivot(const CalibrateTipOptions& options, const Rig& rig, std::size_t index, const Tool& tool) {
+  const auto frames = open_frames(options.input, options, &rig.camera);
+  const MeasuredPoses poses = poses_in_frames(rig, index, {*frames, options.input, options.deinterlace}, watched_job());
+  TipCalibration refused;
+  refused.refusal = poses.read.stopped ? "stopped" : poses.none;
+  if (!refused.refusal.empty()) return refused;
+  say_complaint(options.input, poses.read.complaint);
+  return pivoted_tip(tool, std::vector<double>(tool.wrist.size(), 0), poses.all);
+}
+
+TipCalibration by_touch(const CalibrateTipOptions& options, const Rig& rig, std::size_t index, const Tool& tool) {
+  if (options.board.empty() || !options.square_mm)
+    throw InputError("--touch", "needs --board and --square-mm, for example --board 9x6 --square-mm 5");
+  BoardWords words{options.board, 1e-3 * *options.square_mm, options.dictionary};
+  if (options.marker_mm) words.marker_m = 1e-3 * *options.marker_mm;
+  const Board board = board_of(words);
+  const auto measured = measure_touches(rig, index, tool, board, read_touches(options.input, board, tool),
+                                        options.deinterlace, watched_job());
+  for (const std::string& image : measured.without_marker) std::printf("left out: %s\n", image.c_str());
+  return measured.calibration;
+}
+
+// MM[:SIGMA].
+TipCalibration by_calliper(const CalibrateTipOptions& options, const Rig& rig, std::size_t index, const Tool& tool) {
+  constexpr double usual_sigma_mm = 0.1, most_mm = 500;
+  const std::size_t colon = options.calliper.find(':');
+  const auto distance_mm = parse_finite(options.calliper.substr(0, colon));
+  const auto sigma_mm = colon == std::string::npos ? usual_sigma_mm : parse_finite(options.calliper.substr(colon + 1));
+  if (!distance_mm || !sigma_mm || *distance_mm < 0 || *distance_mm > most_mm || !(*sigma_mm > 0) || *sigma_mm > 5)
+    throw InputError("--calliper", "distance", options.calliper,
+                     "0 to 500 mm, or with its standard deviation of 5 mm at most MM:SIGMA, for example 21.4:0.1");
+  TipCalibration result;
+  result.tool = placed_by_calliper(tool, rig.instruments[index].marker, 1e-3 * *distance_mm, 1e-3 * *sigma_mm);
+  return result;
+}
+
+void print(const TipCalibration& calibration) {
+  const Tool& tool = calibration.tool;
+  const TipInMarker tip = tip_in_marker(tool, std::vector<double>(tool.wrist.size(), 0));
+  std::printf("\n%-36s %10s   %8s\n", "", "", "sigma");
+  const auto line = [](const std::string& name, double value, double variance, double unit) {
+    std::printf("  %-34s %10.4f   %8.4f\n", name.c_str(), unit * value, unit * std::sqrt(variance));
+  };
+  for (Eigen::Index i = 0; i < 3; ++i)
+    line(fmt::format("tip in the marker's frame {} [mm]", "xyz"[i]), tip.marker_from_tip.translation[i],
+         tip.of_place(i, i), 1e3);
+  const auto& covariance = tool.place->covariance;
+  if (!tool.wrist.empty()) line("azimuth of the wrist [degrees]", tool.place->azimuth_rad, covariance(3, 3), 180 / pi);
+  for (std::size_t i = 0; i < tool.wrist.size(); ++i) {
+    const auto k = static_cast<Eigen::Index>(4 + i);
+    line(fmt::format("offset of {} [degrees]", tool.wrist[i].name), tool.wrist[i].offset_rad, covariance(k, k),
+         180 / pi);
+  }
+  if (!calibration.misses_m.empty())
+    std::printf("\nthe tip misses its point by %.3f mm rms in %zu images, %.1f times their noise\n",
+                1e3 * rms(calibration.misses_m), calibration.misses_m.size(), calibration.noise);
+  if (!calibration.fault.empty()) print_faults({calibration.fault});
+  if (!tool.wrist.empty() && !calibration.with_offsets)
+    std::printf("azimuth and offsets of the wrist are as they were: --touch with a bent wrist measures them\n");
+}
+
+int calibrate_tip(CalibrateTipOptions options) {
+  if (!options.pivot.empty() + !options.touches.empty() + !options.calliper.empty() != 1)
+    throw InputError("calibrate tip", "takes one way to measure it, expected --pivot, --touch or --calliper");
+  options.input = options.pivot + options.touches;  // the one that is given
+  Rig rig = load_rig(options.rig);
+  const std::size_t index = instrument_meant(rig, options);
+  refuse_outputs_over_inputs(options, rig);
+  AtomicFile out(options.out);
+  watch_for_interrupts();
+
+  const Tool tool = rig.instruments[index].tool.value_or(Tool{});
+  const auto way = !options.pivot.empty() ? by_pivot : !options.touches.empty() ? by_touch : by_calliper;
+  const TipCalibration calibration = way(options, rig, index, tool);
+  if (!calibration.refusal.empty()) return refuse_calibration(options, calibration.refusal);
+  print(calibration);
+  Tool& measured = rig.instruments[index].tool.emplace(calibration.tool);
+  measured.place->covariance = rounded_covariance(measured.place->covariance);
+  out.stream() << rig_yaml(rig, options.out);
+  out.commit();
+  std::printf("rig: %s\n", options.out.c_str());
+  return 0;
+}
+
+}  // namespace
+
+void add_calibrate_tip(Command parent, Run& run_later) {
+  auto options = std::make_shared<CalibrateTipOptions>();
+  Command command = parent.add_subcommand(
+      "tip", "Measure where the instrument ends: the tip in the marker's frame, and a wrist's place behind it.");
+  command.add_option(
+      "--pivot", options->pivot,
+      "The tip rests in a dimple, its wrist straight, while the shaft is tilted to all sides and rolled: "
+      "a folder, a video, a bag, a camera or a stream of 20 s");
+  command.add_option("--touch", options->touches,
+                     "CSV of images of touches: file, column and row of the inner corner of a board that the tip is "
+                     "on, and a column in rad for each joint of the wrist; an image without column and row shows the "
+                     "board alone");
+  command.add_option("--calliper", options->calliper,
+                     "MM[:SIGMA]: distance of the marker's distal edge from the wrist's axis, or from a straight "
+                     "tool's tip, by callipers; sigma is 0.1 mm if not given");
+  command.add_option("--board", options->board, "Inner corners of the board, COLUMNSxROWS, for example 9x6");
+  command.add_option("--square-mm", options->square_mm, "Width of a square").number_between(0.1, 1000.0);
+  command.add_option("--aruco", options->dictionary, "For a ChArUco board: its markers' dictionary, as DICT_4X4_50");
+  command.add_option("--marker-mm", options->marker_mm, "For a ChArUco board: a marker's width; else 3/4 of a square")
+      .number_between(0.05, 1000.0);
+  add_calibrate_options(command, *options);
+  command.footer(
+      "The rig's camera and marker must be calibrated; a rig without a tool gets a straight one. With --pivot, tilt "
+      "by\n"
+      "20 degrees or more to all sides; with --touch, touch 5 corners or more (10 with the wrist bent differently),\n"
+      "the shaft tilted and rolled differently.\n"
+      "Example:\n  lapservo calibrate tip --pivot pivot.mp4 --rig rig.yaml --out rig.yaml");
+  command.runs(run_later, [options] { return calibrate_tip(*options); });
+}
+
+}  // namespace lapservo::app

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <fmt/format.h>
+
+#include "lapservo/core/csv.h"
+
+namespace lapservo::internal {
+
+/// A covariance to four digits, as files hold it. Correlations are 0.4 % smaller, so that no rounding makes a variance
+/// negative.
+template <typename Covariance>
+Covariance rounded_covariance(Covariance covariance) {
+  constexpr double of_correlations = 0.996;
+  const auto variances = covariance.diagonal().eval();
+  covariance *= of_correlations;
+  covariance.diagonal() = variances;
+  return covariance.unaryExpr([](double number) { return parse_finite(fmt::format("{:.4g}", number)).value(); });
+}
+
+}  // namespace lapservo::internal
