@@ -8,9 +8,9 @@
 
 #include "lapservo/rig/rig.h"
 #include "lapservo/vision/colour/colour_classes.h"
-#include "lapservo/vision/memory/frame_clock.h"
-#include "lapservo/vision/memory/instrument_memory.h"
-#include "lapservo/vision/memory/print_record.h"
+#include "lapservo/vision/decision/frame_clock.h"
+#include "lapservo/vision/decision/instrument_memory.h"
+#include "lapservo/vision/decision/print_record.h"
 #include "lapservo/vision/model/fine_fit.h"
 #include "lapservo/vision/observation.h"
 #include "lapservo/vision/search/marker_search.h"

@@ -7,7 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "lapservo/core/statistics.h"
-#include "lapservo/vision/accept/verification.h"
+#include "lapservo/vision/decision/verification.h"
 #include "lapservo/vision/image/light_image.h"
 #include "lapservo/vision/search/coarse_fit.h"
 #include "lapservo/vision/search/initial_pose.h"

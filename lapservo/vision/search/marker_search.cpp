@@ -5,8 +5,8 @@
 #include <utility>
 
 #include "lapservo/core/angles.h"
-#include "lapservo/vision/accept/displaced_boundary.h"
-#include "lapservo/vision/accept/verification.h"
+#include "lapservo/vision/decision/displaced_boundary.h"
+#include "lapservo/vision/decision/verification.h"
 #include "lapservo/vision/search/coarse_fit.h"
 #include "lapservo/vision/search/initial_pose.h"
 #include "lapservo/vision/search/rcm_starts.h"

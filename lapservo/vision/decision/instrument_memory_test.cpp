@@ -1,9 +1,47 @@
-#include "lapservo/vision/memory/look_schedule.h"
+#include "lapservo/vision/decision/instrument_memory.h"
 
 #include <gtest/gtest.h>
 
 namespace lapservo::internal {
 namespace {
+
+FineFit fit_at(const JointVector& q) {
+  FineFit fit;
+  fit.unknowns = {pose_through_rcm({}, q), true};
+  return fit;
+}
+
+constexpr double psi_0_rad = 0.3, psi_1_rad = 0.4;
+
+// Found in two frames that were taken 40 ms apart.
+InstrumentMemory moving() {
+  const InstrumentMemory first = remembered(std::nullopt, fit_at({0.1, 1.5, 0.06, psi_0_rad}), false, 10);
+  return remembered(first, fit_at({0.1, 1.5, 0.065, psi_1_rad}), false, 10.04);
+}
+
+TEST(InstrumentMemory, ExpectsAnInstrumentToMoveOn) {
+  const InstrumentMemory memory = moving();
+  for (const double frames : {0.5, 1.0, 3.0}) {
+    const PoseUnknowns expected = memory.expected_pose(10.04 + frames * 0.04);
+    EXPECT_NEAR(expected.pose().psi_rad, psi_1_rad + frames * 0.1, 1e-9);
+    EXPECT_NEAR(configuration_of(expected.pose(), {})->rho_m, 0.065 + frames * 0.005, 1e-9);
+  }
+  EXPECT_LT(memory.expected_pose(1e6).pose().psi_rad, psi_1_rad + 0.5);
+  EXPECT_EQ(memory.expected_pose(9).pose().psi_rad, psi_1_rad);
+}
+
+TEST(InstrumentMemory, ExpectsATurnToGoOnForAsLongAsTheTimeBetween) {
+  const InstrumentMemory memory = moving();
+  EXPECT_NEAR(memory.expected(10.12).moved_on->pose().psi_rad, psi_1_rad + 0.2, 1e-9) << "a frame was dropped between";
+  EXPECT_NEAR(memory.expected(10.08).moved_on->pose().psi_rad, psi_1_rad + 0.1, 1e-9);
+}
+
+TEST(InstrumentMemory, OfOneFrameKnowsNoStep) {
+  const InstrumentMemory memory = remembered(std::nullopt, fit_at({0.1, 1.5, 0.06, psi_0_rad}), true, 10);
+  EXPECT_EQ(memory.expected_pose(11).pose().psi_rad, psi_0_rad);
+  EXPECT_FALSE(memory.expected(11).moved_on);
+  EXPECT_TRUE(memory.among_others);
+}
 
 int looks_in(int frames, Processing answer, bool fully) {
   LookSchedule schedule;

@@ -1,4 +1,4 @@
-#include "lapservo/vision/result/marker_pose.h"
+#include "lapservo/vision/decision/fit_observation.h"
 
 #include <cmath>
 

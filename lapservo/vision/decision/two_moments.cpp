@@ -1,4 +1,4 @@
-#include "lapservo/vision/accept/two_moments.h"
+#include "lapservo/vision/decision/two_moments.h"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "lapservo/vision/memory/frame_clock.h"
+#include "lapservo/vision/decision/frame_clock.h"
 
 #include <cmath>
 #include <limits>

@@ -1,4 +1,4 @@
-#include "lapservo/vision/accept/displaced_boundary.h"
+#include "lapservo/vision/decision/displaced_boundary.h"
 
 #include <cstddef>
 #include <cstdint>

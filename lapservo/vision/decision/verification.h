@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstddef>
+
 #include "lapservo/vision/model/fine_fit.h"
 #include "lapservo/vision/shaft/scene.h"
 #include "lapservo/vision/status.h"
@@ -34,6 +36,10 @@ struct ColourAgreement {
   double in_image = 0;  ///< fraction of the visible surface that lies inside the image
 };
 ColourAgreement colour_agreement(const Scene& scene, const ShaftPose& pose, const EdgeBlur& blur = {});
+
+/// On how many of so many lines along the marker nothing hides a boundary: colours of the marker, whichever, show on
+/// both sides, of an end inside.
+int lines_in_clear_view(const Scene& scene, const ShaftPose& pose, std::size_t boundary, int lines);
 
 /// Whether a fit is good enough to move a robot by: Status::ok, or why not.
 Status validate(const Scene& scene, const FineFit& fit);

@@ -1,4 +1,4 @@
-#include "lapservo/vision/memory/print_record.h"
+#include "lapservo/vision/decision/print_record.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "lapservo/vision/memory/instrument_memory.h"
+#include "lapservo/vision/decision/instrument_memory.h"
 
 #include <algorithm>
 
