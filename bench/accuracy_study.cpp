@@ -1,6 +1,7 @@
 // accuracy_study STUDY [FRAMES [SEED [ROW...]]]: accuracy and normalised errors of the tracker, a row for each
 // condition of the study (camera, samples, blood or motion: accuracy_study.h), all of them without ROW. Tables of
-// docs/notes/accuracy.md. The study "edges" is of single boundaries and sides, "hostile" counts false accepts.
+// docs/notes/accuracy.md. The study "edges" is of single boundaries and sides, "hostile" counts false accepts,
+// "colours" what pixels show.
 #include "bench/accuracy_study.h"
 
 #include <algorithm>
@@ -60,8 +61,11 @@ int main(int argc, char** argv) {
   const std::uint64_t seed = argc > 3 ? static_cast<std::uint64_t>(std::atoll(argv[3])) : 1;
   if (name == "edges") return print_edge_errors(frames, seed), 0;
   if (name == "hostile") return print_false_accepts(frames, seed), 0;
+  if (name == "colours") return print_colour_frequencies(frames, seed), 0;
   const auto study = studies.find(name);
   if (study == studies.end())
-    return std::fputs("accuracy_study camera|samples|blood|motion|edges|hostile [FRAMES [SEED [ROW...]]]\n", stderr), 2;
+    return std::fputs("accuracy_study camera|samples|blood|motion|edges|hostile|colours [FRAMES [SEED [ROW...]]]\n",
+                      stderr),
+           2;
   return run(study->second(), frames, seed, {argv + std::min(argc, 4), argv + argc});
 }

@@ -39,6 +39,10 @@ void print_edge_errors(int frames, std::uint64_t seed);
 /// wrong rig. And how often psi is wrong by what p_false says of it.
 void print_false_accepts(int frames, std::uint64_t seed);
 
+/// Prints how often hostile frames with blood show a marker's colours amid its bands, on the shaft beyond them and
+/// beside it: the table of lapservo/vision/colour/colour_evidence.h.
+void print_colour_frequencies(int frames, std::uint64_t seed);
+
 /// The truth for a tracker whose rig has this print. The seam's displacement shows in no image and counts for no error.
 void take_print_for(acceptance::TrueFrame& frame, const Marker& marker);
 

@@ -11,13 +11,16 @@
 #include "bench/accuracy_study.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/core/random.h"
+#include "lapservo/geometry/cylinder.h"
 #include "lapservo/kinematics/visibility.h"
+#include "lapservo/marker/azimuths.h"
 #include "lapservo/sim/blood.h"
 #include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/tissue.h"
 #include "lapservo/testing/camera_effects.h"
 #include "lapservo/testing/motion.h"
 #include "lapservo/testing/scenes.h"
+#include "lapservo/vision/colour/colour_evidence.h"
 
 namespace lapservo::bench {
 namespace {
@@ -189,7 +192,81 @@ void print(const std::string& name, const Count& count) {
   std::printf("| %s | %d | %d | %d |\n", name.c_str(), count.markers, count.ok, count.wrong);
 }
 
+// Counts what the pixels show in their places by the true pose.
+class ColourCounts {
+ public:
+  void add(const Scene& scene, const ShaftPose& pose) {
+    const auto view = view_cylinder(pose.camera_from_unrolled, scene.marker.radius_m());
+    if (!view) return;
+    for (int i = 0; i < lines; ++i) add_line(scene, pose, visible_azimuth_rad(*view, line_reach, i, lines));
+    for (const double side : {-1.0, 1.0})
+      for (const double radii : {1.1, 1.2, 1.4})
+        for (int k = 0; k < places; ++k)
+          add(scene, Place::beside,
+              pose.camera_from_unrolled * surface_point(radii * scene.marker.radius_m(),
+                                                        view->facing_azimuth_rad + side * pi / 2, at_m(scene, k)));
+  }
+  void print() const {
+    std::puts("| place | its band | another | grey | other |\n| --- | --- | --- | --- | --- |");
+    for (std::size_t place = 0; place < counts_.size(); ++place) {
+      auto of = counts_[place];
+      if (place > 0) of[0] = of[1] / 3, of[1] -= of[0];  // no band belongs there
+      const double all = of[0] + of[1] + of[2] + of[3];
+      std::printf("| %s | %.3f | %.3f | %.3f | %.3f |\n", place_names[place], of[0] / all, of[1] / all, of[2] / all,
+                  of[3] / all);
+    }
+  }
+
+ private:
+  static constexpr int lines = 9, places = 40;
+  static constexpr double line_reach = 0.85, beyond = 0.15, guard = 0.03;  // of the visible half angle; of the length
+  static constexpr std::array<const char*, 3> place_names{"band", "shaft", "beside"};
+
+  static double at_m(const Scene& scene, int k) {
+    return scene.marker.length_m() * ((1 + 2 * beyond) * (k + 0.5) / places - beyond);
+  }
+  void add_line(const Scene& scene, const ShaftPose& pose, double azimuth_rad) {
+    const auto ends_m = boundaries_m(scene.marker, marker_azimuth_rad(scene.marker, azimuth_rad, pose.psi_rad));
+    for (int k = 0; k < places; ++k) {
+      const double along_m = at_m(scene, k), guard_m = guard * scene.marker.length_m();
+      if (std::any_of(ends_m.begin(), ends_m.end(), [&](double end_m) { return std::abs(end_m - along_m) < guard_m; }))
+        continue;
+      const auto band = std::upper_bound(ends_m.begin(), ends_m.end(), along_m) - ends_m.begin() - 1;
+      const bool on_band = band >= 0 && band < 3;
+      add(scene, on_band ? Place::band : Place::shaft,
+          pose.camera_from_unrolled * surface_point(scene.marker.radius_m(), azimuth_rad, along_m),
+          on_band ? scene.bands[static_cast<std::size_t>(band)] : Scene::outside);
+    }
+  }
+  void add(const Scene& scene, Place place, const Eigen::Vector3d& point, std::uint8_t its_band = Scene::outside) {
+    if (!scene.field.contains(point)) return;
+    const Eigen::Vector2d raw_px = scene.camera.raw_from_point(point);
+    const std::uint8_t colour = scene.class_at(raw_px);
+    if (colour == Scene::outside) return;
+    Shows shows = Shows::another_band;
+    if (!scene.is_ours(colour))
+      shows = grey_or_other(scene.image.pixel(static_cast<int>(raw_px.x() + 0.5), static_cast<int>(raw_px.y() + 0.5)));
+    else if (colour == its_band)
+      shows = Shows::its_band;
+    counts_[static_cast<std::size_t>(place)][static_cast<std::size_t>(shows)] += 1;
+  }
+
+  std::array<std::array<double, 4>, 3> counts_{};
+};
+
 }  // namespace
+
+void print_colour_frequencies(int frames, std::uint64_t seed) {
+  ColourCounts counts;
+  for (int i = 0; i < frames; ++i) {
+    const auto [drawn, frame] = draw_frame(1'000'000 * seed + static_cast<std::uint64_t>(i));
+    if (!drawn[blood] || drawn[wrong_rig]) continue;
+    const scenes::Sight sight(frame.rig, frame.bgr);
+    for (std::size_t k = 0; k < frame.truths.size(); ++k)
+      counts.add(sight.scene(k), scenes::pose_of(frame.rig, k, frame.truths[k].q));
+  }
+  counts.print();
+}
 
 void print_false_accepts(int frames, std::uint64_t seed) {
   Count all;

@@ -12,6 +12,7 @@
 #include "lapservo/core/inplace_vector.h"
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/marker/azimuths.h"
+#include "lapservo/vision/colour/colour_evidence.h"
 #include "lapservo/vision/model/normal_equations.h"
 #include "lapservo/vision/search/heaviest_stretch.h"
 #include "lapservo/vision/search/line_segmentation.h"
@@ -46,7 +47,7 @@ Eigen::Vector3d point_on(const ShaftPose& pose, const Marker& marker, double azi
 Stretch<float> most_colourful_stretch(std::span<const std::uint8_t> classes, const Scene& scene) {
   return heaviest_stretch(0, static_cast<int>(classes.size()), [&](int i) {
     const std::uint8_t colour = classes[static_cast<std::size_t>(i)];
-    return scene.is_ours(colour) ? 1.0F : (colour == Scene::outside ? -0.2F : -0.8F);
+    return colour == Scene::outside ? 0.0F : static_cast<float>(section_gain(scene.is_ours(colour)));
   });
 }
 

@@ -8,17 +8,10 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/marker/azimuths.h"
+#include "lapservo/vision/colour/colour_evidence.h"
 
 namespace lapservo::internal {
 namespace {
-
-// The gain of a sample; one that has the colour that belongs there 1.
-struct SampleGains {
-  double another_band = -1, blood = -0.15, bare = -0.6;                   // on the marker
-  double marker_beyond = -0.5, bare_beyond = 0.15, blood_beyond = -0.15;  // beyond its ends, on the shaft
-  double marker_beside = -0.5;                                            // beside the shaft
-};
-constexpr SampleGains sample_gains;
 
 // Bits of the bands that may show at each place along a line of the marker.
 constexpr int places_along = 36;
@@ -61,15 +54,6 @@ BandsOfClass bands_of_class(const Scene& scene) {
   BandsOfClass bands{};
   for (std::size_t band = 3; band-- > 0;) bands[scene.bands[band]] = bit_of(band);
   return bands;
-}
-
-// For a pixel without the marker's colour: whether it is as grey as bare shaft, or as red as blood.
-bool is_grey(const std::uint8_t* bgr) {
-  constexpr int dark = 20;  // there noise makes any colour
-  constexpr double least_saturation = 0.35;
-  const int b = bgr[0], g = bgr[1], r = bgr[2];
-  const int most = std::max(std::max(b, g), r), least = std::min(std::min(b, g), r);
-  return static_cast<int>(most < dark) | static_cast<int>(most - least < least_saturation * most);
 }
 
 // Places along a line of the shaft in the image, `Before` of them before the marker and as many behind it. All are
@@ -121,17 +105,14 @@ class LineInImage {
   Places u_px_, v_px_, depth_m_;
 };
 
-// The gain of a sample by what it shows: blood, none, another band, the right one.
-using Gains = std::array<double, 4>;
-constexpr Gains gains_on_marker{sample_gains.blood, sample_gains.bare, sample_gains.another_band, 1};
-constexpr Gains gains_beyond{sample_gains.blood_beyond, sample_gains.bare_beyond, sample_gains.marker_beyond,
-                             sample_gains.marker_beyond};
-
 // `here`: the bands that may show there; none beyond the marker's ends.
 double gain(const std::uint8_t* bgr, std::uint8_t seen, std::uint8_t here) {
-  const std::size_t of_colour = 2 + static_cast<std::size_t>((seen & here) != 0);
-  const std::size_t shows = seen ? of_colour : static_cast<std::size_t>(is_grey(bgr));
-  return here ? gains_on_marker[shows] : gains_beyond[shows];
+  const Shows shows = !seen ? grey_or_other(bgr) : seen & here ? Shows::its_band : Shows::another_band;
+  return colour_evidence.of(here ? Place::band : Place::shaft, shows);
+}
+
+double gain_beside(const std::uint8_t* bgr, std::uint8_t seen) {
+  return colour_evidence.of(Place::beside, seen ? Shows::another_band : grey_or_other(bgr));
 }
 
 double area_px2(const Scene& scene, const ShaftPose& pose) {
@@ -150,8 +131,10 @@ double area_px2(const Scene& scene, const ShaftPose& pose) {
 double explained_area_px2(const Scene& scene, const ShaftPose& pose, bool turned, double above_px2) {
   constexpr std::size_t beyond = 6;
   constexpr int lines = 9;
-  constexpr double line_reach = 0.85, most_of_line = places_along + 2 * beyond * sample_gains.bare_beyond;
-  constexpr double rounding = 1e-6;
+  constexpr double line_reach = 0.85, rounding = 1e-6;
+  constexpr std::array beside_radii{1.08, 1.2};
+  const double most_of_line = places_along + 2 * beyond * colour_evidence.of(Place::shaft, Shows::grey);
+  const double most_beside = 2 * beside_radii.size() * places_along * colour_evidence.of(Place::beside, Shows::other);
   const auto view = view_cylinder(pose.camera_from_unrolled, scene.marker.radius_m());
   if (!view) return no_area_px2;
   const double radius_m = scene.marker.radius_m(), whole_px2 = area_px2(scene, pose);
@@ -163,7 +146,7 @@ double explained_area_px2(const Scene& scene, const ShaftPose& pose, bool turned
   if (!turned) bands = bands_of_whole_turn(scene.marker);
   double gained = 0;
   for (int i = 0; i < lines; ++i) {
-    if (gained + (lines - i) * most_of_line < least_gain) return no_area_px2;
+    if (gained + (lines - i) * most_of_line + most_beside < least_gain) return no_area_px2;
     const double azimuth_rad = visible_azimuth_rad(*view, line_reach, i, lines);
     if (turned) bands = bands_at(scene.marker, marker_azimuth_rad(scene.marker, azimuth_rad, pose.psi_rad));
     const Eigen::Vector3d base = pose.camera_from_unrolled * surface_point(radius_m, azimuth_rad, 0);
@@ -173,15 +156,14 @@ double explained_area_px2(const Scene& scene, const ShaftPose& pose, bool turned
       if (const std::uint8_t* bgr = line.pixel(k, here != 0)) gained += gain(bgr, band_of[scene.classes(bgr)], here);
     }
   }
-  if (gained < least_gain) return no_area_px2;
+  if (gained + most_beside < least_gain) return no_area_px2;
   for (const double side : {-1.0, 1.0})
-    for (const double radii : {1.08, 1.2}) {
+    for (const double radii : beside_radii) {
       const Eigen::Vector3d base =
           pose.camera_from_unrolled * surface_point(radii * radius_m, view->facing_azimuth_rad + side * pi / 2, 0);
       const LineInImage<0> line(scene, base, axis, LineInImage<0>::along_m(scene.marker));
       for (std::size_t k = 0; k < line.count; ++k)
-        if (const std::uint8_t* bgr = line.pixel(k, false); bgr && band_of[scene.classes(bgr)])
-          gained += sample_gains.marker_beside;
+        if (const std::uint8_t* bgr = line.pixel(k, false)) gained += gain_beside(bgr, band_of[scene.classes(bgr)]);
     }
   return gained / (lines * places_along) * whole_px2;
 }

@@ -10,6 +10,7 @@
 #include "lapservo/core/statistics.h"
 #include "lapservo/geometry/rotation.h"
 #include "lapservo/marker/band_shares.h"
+#include "lapservo/vision/colour/colour_evidence.h"
 #include "lapservo/vision/search/coarse_fit.h"
 #include "lapservo/vision/search/heaviest_stretch.h"
 #include "lapservo/vision/search/line_segmentation.h"
@@ -116,7 +117,7 @@ std::optional<Section> section_at(const Scene& scene, const ImageFrame& frame, d
   const int reach = static_cast<int>(reach_px / step_px);
   const auto colour_at = [&](int i) { return scene.class_at(scene.camera.raw_from_ideal(frame.at(x, i * step_px))); };
   const Stretch<double> coloured =
-      heaviest_stretch(-reach, reach + 1, [&](int i) { return scene.is_ours(colour_at(i)) ? 1 : -0.8; });
+      heaviest_stretch(-reach, reach + 1, [&](int i) { return section_gain(scene.is_ours(colour_at(i))); });
   if (coloured.sum * step_px < 4) return std::nullopt;
   if (colour_at(coloured.first - 1) == Scene::outside || colour_at(coloured.last + 1) == Scene::outside)
     return std::nullopt;

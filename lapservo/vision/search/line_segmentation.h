@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "lapservo/core/statistics.h"
+#include "lapservo/vision/colour/colour_evidence.h"
 #include "lapservo/vision/shaft/scene.h"
 
 namespace lapservo::internal {
@@ -32,9 +33,10 @@ inline std::optional<double> agreed_end(std::vector<double>& places) {
 /// The gain of segment_line from a sample of a colour in a state: 0 shaft, 1..3 the bands, 4 shaft. Internal.
 inline float line_reward(std::size_t state, std::uint8_t colour, const std::array<std::uint8_t, 3>& bands) {
   if (colour == Scene::outside) return 0;
-  if (state == 0 || state == 4) return colour == 0 ? 0.3F : -0.7F;
-  if (colour == bands[state - 1]) return 1;
-  return colour == 0 ? -0.35F : -1;
+  const Place place = state == 0 || state == 4 ? Place::shaft : Place::band;
+  if (colour == 0) return static_cast<float>(colour_evidence.of_none(place));
+  const bool is_its = place == Place::band && colour == bands[state - 1];
+  return static_cast<float>(colour_evidence.of(place, is_its ? Shows::its_band : Shows::another_band));
 }
 
 }  // namespace lapservo::internal
