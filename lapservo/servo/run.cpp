@@ -118,6 +118,15 @@ class FirstSight {
   bool saw_joints_ = false, saw_image_ = false;
 };
 
+// The tip in an image by the wrist as it was then.
+void add_tip(ControlTick& tick, const Instrument& instrument, const TipGoals& tips) {
+  if (!tick.seen || !instrument.tool) return;
+  Observation& seen = tick.seen->observations.front();
+  const double exposed_s = tick.seen->measurement.time_s - tick.decision.control.delay_s;
+  if (const auto wrist_rad = tips.wrist_rad(exposed_s - tick.input.time_s))
+    seen.tip = tip_of(seen, *instrument.tool, *wrist_rad);
+}
+
 // Corrects goals of the tip by an image that the loop has used.
 void watch_tip(ControlTick& tick, const Trajectory& trajectory, double start_s,
                const std::optional<Rigid3>& first_from_rcm, TipGoals& tips) {
@@ -179,6 +188,7 @@ void run(Supervisor& arm, ImageStream& images, Clock& clock, const RunConfig& co
     if (tick.decision.send) arm.send(servo.path());
     if (tick.decision.release) arm.release();
     tell(arm, tick.decision);
+    add_tip(tick, config.rig.instruments.at(0), tips);
     watch_tip(tick, trajectory, start_s, first_from_rcm, tips);
     if (tick.decision.registration != registration) {
       registration = tick.decision.registration;

@@ -88,13 +88,19 @@ void TipGoals::follow_wrist(const std::vector<double>& now_rad, double time_s) {
   }
 }
 
-std::optional<Rigid3> TipGoals::marker_from_tip(double ahead_s) const {
+std::optional<std::vector<double>> TipGoals::wrist_rad(double ahead_s) const {
   const auto& tool = rig_.instruments[0].tool;
-  if (!tool || !tool->place || wrist_.size() != tool->wrist.size()) return std::nullopt;
+  if (!tool || wrist_.size() != tool->wrist.size()) return std::nullopt;
   std::vector<double> wrist_rad;
   for (const WristMotion& joint : wrist_)
     wrist_rad.push_back(joint.rad + ahead_s * joint.rad_s + ahead_s * ahead_s / 2 * joint.rad_s2);
-  return tip_in_marker(*tool, wrist_rad).marker_from_tip;
+  return wrist_rad;
+}
+
+std::optional<Rigid3> TipGoals::marker_from_tip(double ahead_s) const {
+  const auto wrist = wrist_rad(ahead_s);
+  const auto& tool = rig_.instruments[0].tool;
+  return wrist && tool->place ? std::optional(tip_in_marker(*tool, *wrist).marker_from_tip) : std::nullopt;
 }
 
 void TipGoals::see(const ImageMeasurement& image, const Rigid3& camera_from_rcm) {

@@ -39,6 +39,9 @@ class TipGoals {
   /// An image that the loop has used, taken with that registration.
   void see(const ImageMeasurement& image, const Rigid3& camera_from_rcm);
 
+  /// Readings of the wrist's joints, in the tool's order, moved on by `ahead_s` as they move [rad]; none for a straight
+  /// tool. Nullopt without a tool and where the arm does not measure all of its joints.
+  std::optional<std::vector<double>> wrist_rad(double ahead_s) const;
   /// The configuration for a goal, corrected by the images, with the wrist as it is after `ahead_s`.
   std::optional<JointVector> configuration(const TipGoal& goal, double ahead_s = 0) const;
   /// Where the registration has the tip.

@@ -174,6 +174,7 @@ TEST(TipGoals, FollowTheWrist) {
     EXPECT_LT((Truth{rig}.tip_at(*q, wrist_rad) - goal_m).norm(), 1e-12);
     EXPECT_LT((model(q->vector())->features - now.features).norm(), 1e-9);
     if (k < 60) continue;
+    EXPECT_NEAR(tips.wrist_rad(-0.05)->at(0), wrist_rad[0] - 0.5 * 0.05, 1e-3);
     tips.follow(joints_at(time_s, there, {wrist_rad[0] + 0.5 * 1e-3, -0.1}));  // no later: it does not count
     const auto later = tips.configuration({goal_m}, 1e-3);
     const Eigen::Vector4d rate = (model(later->vector())->features - now.features) / 1e-3;
