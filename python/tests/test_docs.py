@@ -26,6 +26,8 @@ ELSEWHERE = {"tutorial.md": ("debian/tests/pages", ["sh", "sh", "yaml", "sh", "s
 #: Blocks that are no code, by page and first line.
 TEXT = {("README.md", "lapservo/core geometry marker kinematics rcm rig   values: no images, no control"): "the folders",
         ("README.md", "@software{lapservo,"): "BibTeX",
+        ("calibration.md", "file,column,row,wrist_pitch,wrist_yaw"): "a table of touches, as calibrate_tip_test writes one",
+        ("tip_goals.md", "--tip: can't be followed at 0.00 s: limits.upper rho_m 0.2: needs 0.22; the nearest that can be reached is ..."): "a message",
         ("quickstart.md", "./dev package"): "makes and installs the packages: `./dev package test` does"}
 
 #: Lines that can't be run here, by how they begin.
@@ -38,6 +40,8 @@ NOT_RUN = {
     "ctest ": "runs the tests that this is one of",
     "rosbag record": "is ROS's own; swing.bag is what `lapservo record` wrote in the line before",
     "ssh ": "another computer",
+    "lapservo calibrate tip --pivot ": "needs a recording of a tip in a dimple; calibrate_tip_test makes one",
+    "lapservo calibrate tip --touch ": "needs images of touches",
     "docker ": "needs Docker's daemon",
     "cd ros2_ws && colcon ": "needs ROS 2; the test ros2.lapservo_msgs builds the package, ./dev colcon both",
     "ros2 launch ": "is ROS 2's; the test packaging.ros2 reads the files",

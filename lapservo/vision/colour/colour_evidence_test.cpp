@@ -27,7 +27,7 @@ TEST(ColourEvidence, SpeaksForThePlaceOfEachColour) {
   EXPECT_LT(colour_evidence.of(Place::band, Shows::another_band), -1);
 }
 
-// What hides a band speaks less against it than another colour does, and no colour at all lies between grey and blood.
+// Blood speaks less against a band than grey does; a pixel without a colour lies between both.
 TEST(ColourEvidence, IsMildWithBlood) {
   const double blood = colour_evidence.of(Place::band, Shows::other),
                grey = colour_evidence.of(Place::band, Shows::grey);

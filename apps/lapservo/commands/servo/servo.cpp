@@ -25,6 +25,7 @@
 #include "lapservo/rig/single_instrument.h"
 #include "lapservo/robot/supervisor.h"
 #include "lapservo/servo/controller_file.h"
+#include "lapservo/servo/goal_check.h"
 #include "lapservo/servo/image_features.h"
 #include "lapservo/servo/replay.h"
 #include "lapservo/servo/run.h"
@@ -52,7 +53,13 @@ JointVector joints_at_start(const ServoOptions& options, const Trajectory& traje
   if (!options.start.empty()) return JointVector::from_vector(four(options.start));
   Random random(options.seed);
   TipGoals tips(run.rig, run.controller.scales);
-  if (trajectory.tip_at(0)) tips.refuse_incomplete(run.trajectory_name, true);
+  if (trajectory.tip_at(0)) {
+    const JointLimits& limits = run.controller.limits;
+    JointState amid_limits;
+    amid_limits.q = JointVector::from_vector((limits.lower + limits.upper) / 2);
+    refuse_goal(trajectory, duration_s(options), run.rig, run.rig.instruments.front().camera_from_rcm, run.controller,
+                amid_limits, run.trajectory_name);
+  }
   return random_start(tips.features_of(trajectory), duration_s(options), true_model, run.controller, joint_offset,
                       random, run.trajectory_name);
 }
