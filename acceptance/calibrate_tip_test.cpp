@@ -247,6 +247,7 @@ struct Row {
                 errors_mm.size() / 3, refused, distance_mm, rms(in_sigmas));
     EXPECT_EQ(refused, 0) << name;
     EXPECT_LT(distance_mm, most_mm) << name;
+    EXPECT_LT(rms(in_sigmas), 2) << name;
     if (seeds().size() < 20) return;
     EXPECT_GT(rms(in_sigmas), 0.7) << name;
     EXPECT_LT(rms(in_sigmas), 1.4) << name;
@@ -269,7 +270,8 @@ TEST(CalibrateTip, ByAPivot) {
       const Tool truth = true_tool(seed, laboratory(seed).instruments[0].marker, row == &wristed);
       row->add(pivot(seed, truth, {.compressed = row == &video}), truth);
     }
-  straight.expect(0.1), wristed.expect(0.1), video.expect(0.1);
+  straight.expect(0.1), wristed.expect(0.1);
+  video.expect(0.4);  // compression moves the boundaries of neighbouring frames alike: its sigmas are as large
 }
 
 TEST(CalibrateTip, ByTouch) {
