@@ -76,8 +76,7 @@ struct PoseErrors {
   void add(const TrueFrame& frame, const Observation::MarkerPose& seen) {
     const Instrument& instrument = frame.rig.instruments[0];
     const JointVector& q = frame.truths[0].q;
-    const Rigid3 truth =
-        camera_from_marker(instrument.marker, *instrument.camera_from_rcm * rcm_from_unrolled(q), q.psi_rad);
+    const Rigid3 truth = camera_from_marker(instrument.marker, *instrument.camera_from_rcm, q);
     const Eigen::Matrix3d turn = (truth.rotation.conjugate() * seen.camera_from_marker.rotation).toRotationMatrix();
     const Eigen::Vector3d off_m = seen.camera_from_marker.translation - truth.translation;
     axis_rad.push_back(turn.col(2).head<2>().norm());

@@ -107,7 +107,8 @@ class DynamicLoop {
  private:
   static Rigid3 marker_in(const Rig& scene, const MujocoArm& arm) {
     const Instrument& instrument = scene.instruments[0];
-    return marker_pose_at(*instrument.camera_from_rcm, instrument.marker, JointVector::from_vector(arm.true_jp()));
+    return lapservo::camera_from_marker(instrument.marker, *instrument.camera_from_rcm,
+                                        JointVector::from_vector(arm.true_jp()));
   }
   ImageMeasurement exposed(const FeatureState& seen, const Rigid3& camera_from_marker, const Eigen::Vector4d& q,
                            double stamp_s, Random& random) const {
@@ -327,7 +328,7 @@ DynamicLoop loop_of(const Tool& tool, std::uint64_t seed) {
 Eigen::Vector3d first_tip_m(const DynamicLoop& loop) {
   const Instrument& scene = loop.true_rig->instruments[0];
   const Rigid3 camera_from_marker =
-      marker_pose_at(*scene.camera_from_rcm, scene.marker, JointVector::from_vector(loop.start));
+      lapservo::camera_from_marker(scene.marker, *scene.camera_from_rcm, JointVector::from_vector(loop.start));
   return camera_from_marker *
          tip_in_marker(*loop.rig.instruments[0].tool, loop.wrist_rad(0)).marker_from_tip.translation;
 }

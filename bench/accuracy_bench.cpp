@@ -37,8 +37,7 @@ struct Scene {
 
   Rigid3 camera_from_marker() const {
     const Instrument& instrument = rig.instruments[0];
-    return lapservo::camera_from_marker(instrument.marker, *instrument.camera_from_rcm * rcm_from_unrolled(q),
-                                        q.psi_rad);
+    return lapservo::camera_from_marker(instrument.marker, *instrument.camera_from_rcm, q);
   }
 };
 

@@ -71,9 +71,7 @@ TEST(DvrkFrames, AfterSetBaseFrameMeasuredCpLiesWhereTheMarkersPoseSays) {
         joints[i] = random.uniform(ranges.low[at] - 0.1, ranges.high[at] + 0.1);
       }
       const auto q = JointVector::from_vector(q_from_joints(*instrument.joints, joints));
-      const Rigid3 seen =
-          dvrk_from_camera() *
-          camera_from_marker(instrument.marker, *instrument.camera_from_rcm * rcm_from_unrolled(q), q.psi_rad);
+      const Rigid3 seen = dvrk_from_camera() * camera_from_marker(instrument.marker, *instrument.camera_from_rcm, q);
       const Eigen::Isometry3d told = measured_cp(base_frame, joints);
       EXPECT_LT((told.translation() - seen.translation).norm(), 1e-6);
       const Eigen::Matrix3d turn = seen.rotation.toRotationMatrix().transpose() * told.linear();

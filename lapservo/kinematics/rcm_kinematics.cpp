@@ -21,6 +21,10 @@ Rigid3 camera_from_marker(const Marker& marker, const Rigid3& camera_from_unroll
   return {(camera_from_unrolled.rotation * roll).normalized(), camera_from_unrolled.translation};
 }
 
+Rigid3 camera_from_marker(const Marker& marker, const Rigid3& camera_from_rcm, const JointVector& q) {
+  return camera_from_marker(marker, camera_from_rcm * rcm_from_unrolled(q), q.psi_rad);
+}
+
 std::optional<JointVector> configuration_through(const Rigid3& camera_from_rcm,
                                                  const Eigen::Vector3d& proximal_end_in_camera) {
   const Eigen::Vector3d arm = camera_from_rcm.inverse() * proximal_end_in_camera;

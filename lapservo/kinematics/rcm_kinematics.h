@@ -20,6 +20,9 @@ Rigid3 rcm_from_unrolled(const JointVector& q);
 /// The marker's frame: origin at its proximal end on the axis, z along the axis to the tip, x towards tau = 0.
 Rigid3 camera_from_marker(const Marker& marker, const Rigid3& camera_from_unrolled, double psi_rad);
 
+/// The same of a configuration.
+Rigid3 camera_from_marker(const Marker& marker, const Rigid3& camera_from_rcm, const JointVector& q);
+
 /// The configuration (psi = 0) of a shaft through the RCM whose marker begins at a point; nullopt at the RCM itself.
 std::optional<JointVector> configuration_through(const Rigid3& camera_from_rcm,
                                                  const Eigen::Vector3d& proximal_end_in_camera);

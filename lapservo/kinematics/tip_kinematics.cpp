@@ -37,7 +37,7 @@ std::optional<JointVector> configuration_of_tip(const Rigid3& camera_from_rcm, c
   for (int i = 0; i < enough; ++i) {
     q = configuration_of_tip(camera_from_rcm, marker, marker_from_tip.translation, tip_in_camera_m, psi_rad);
     if (!q) return std::nullopt;
-    const Eigen::Matrix3d to_turn = (marker_pose_at(camera_from_rcm, marker, *q).rotation.conjugate() *
+    const Eigen::Matrix3d to_turn = (camera_from_marker(marker, camera_from_rcm, *q).rotation.conjugate() *
                                      camera_from_tip * marker_from_tip.rotation.conjugate())
                                         .toRotationMatrix();
     const double turn_rad = std::atan2(to_turn(1, 0) - to_turn(0, 1), to_turn(0, 0) + to_turn(1, 1));
@@ -45,10 +45,6 @@ std::optional<JointVector> configuration_of_tip(const Rigid3& camera_from_rcm, c
     psi_rad = wrap_pi(psi_rad + turn_rad);
   }
   return q;
-}
-
-Rigid3 marker_pose_at(const Rigid3& camera_from_rcm, const Marker& marker, const JointVector& q) {
-  return camera_from_marker(marker, camera_from_rcm * rcm_from_unrolled(q), q.psi_rad);
 }
 
 }  // namespace lapservo::internal

@@ -23,7 +23,4 @@ std::optional<JointVector> configuration_of_tip(const Rigid3& camera_from_rcm, c
                                                 const Rigid3& marker_from_tip, const Eigen::Vector3d& tip_in_camera_m,
                                                 const Eigen::Quaterniond& camera_from_tip);
 
-/// camera_from_marker of a configuration.
-Rigid3 marker_pose_at(const Rigid3& camera_from_rcm, const Marker& marker, const JointVector& q);
-
 }  // namespace lapservo::internal

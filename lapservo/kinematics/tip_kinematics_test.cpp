@@ -31,7 +31,7 @@ void for_random_tips(std::uint64_t seed, const Law& law) {
       if (std::sin(q.phi_rad) < 0.3) continue;
       SCOPED_TRACE("seed " + std::to_string(seed) + ", trial " + std::to_string(trial));
       const Rigid3 marker_from_tip = random_tip(random);
-      law(model, q, marker_from_tip, marker_pose_at(model.camera_from_rcm, model.marker, q) * marker_from_tip);
+      law(model, q, marker_from_tip, camera_from_marker(model.marker, model.camera_from_rcm, q) * marker_from_tip);
     }
 }
 
@@ -51,7 +51,7 @@ TEST(TipKinematics, AnyRollHoldsTheTipInItsPlace) {
     const auto found = configuration_of_tip(model.camera_from_rcm, model.marker, tip.translation, seen.translation,
                                             random.uniform(-pi, pi));
     ASSERT_TRUE(found);
-    const Rigid3 there = marker_pose_at(model.camera_from_rcm, model.marker, *found) * tip;
+    const Rigid3 there = camera_from_marker(model.marker, model.camera_from_rcm, *found) * tip;
     EXPECT_LT((there.translation - seen.translation).norm(), 1e-12);
   });
 }
@@ -70,7 +70,7 @@ TEST(TipKinematics, AnOrientationGivesThePsiThatComesNearestToIt) {
     const auto off_rad = [&](double psi_rad) {
       JointVector turned = best;
       turned.psi_rad = psi_rad;
-      return wanted.angularDistance((marker_pose_at(model.camera_from_rcm, model.marker, turned) * tip).rotation);
+      return wanted.angularDistance((camera_from_marker(model.marker, model.camera_from_rcm, turned) * tip).rotation);
     };
     for (const double by_rad : {-0.01, 0.01}) EXPECT_GT(off_rad(best.psi_rad + by_rad), off_rad(best.psi_rad));
   });

@@ -12,7 +12,7 @@ namespace lapservo::internal {
 namespace {
 
 Rigid3 camera_from_marker_at(const Instrument& instrument, const JointVector& q) {
-  return camera_from_marker(instrument.marker, *instrument.camera_from_rcm * rcm_from_unrolled(q), q.psi_rad);
+  return camera_from_marker(instrument.marker, *instrument.camera_from_rcm, q);
 }
 
 PoseMessage message_of(const Rigid3& pose, const Eigen::Matrix<double, 6, 6>& covariance) {

@@ -1114,7 +1114,7 @@ TEST(Run, TheTipDrawsACircleOnItsGoal) {
   const SimulatorConfig simulated;
   Simulator simulator(scene, simulated, start);
   const auto true_tip_m = [&] {
-    return Eigen::Vector3d(marker_pose_at(*instrument.camera_from_rcm, instrument.marker, simulator.true_q()) *
+    return Eigen::Vector3d(camera_from_marker(instrument.marker, *instrument.camera_from_rcm, simulator.true_q()) *
                            tip_in_marker_m);
   };
   const auto goal_m = [centre_m = true_tip_m()](double time_s) -> Eigen::Vector3d {

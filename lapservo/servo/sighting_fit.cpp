@@ -108,7 +108,7 @@ class Fit {
     now.segment<6>(arm::rotation) += part * x.segment<6>(arm::change);
     const auto joints = JointVector::from_vector(q);
     const Rigid3 camera_from_rcm = moved_by(now, data_.camera_from_rcm);
-    return camera_from_marker(data_.marker, camera_from_rcm * rcm_from_unrolled(joints), joints.psi_rad);
+    return camera_from_marker(data_.marker, camera_from_rcm, joints);
   }
 
   const ArmData& data_;

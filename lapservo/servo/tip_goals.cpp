@@ -14,6 +14,7 @@
 #include "lapservo/kinematics/tip_kinematics.h"
 #include "lapservo/servo/image_features.h"
 #include "lapservo/tool/tool.h"
+#include "lapservo/tool/wrist.h"
 
 namespace lapservo::internal {
 namespace {
@@ -44,9 +45,7 @@ void TipGoals::refuse_incomplete(const std::string& source, bool has_joints) con
   if (!rig_.instruments[0].camera_from_rcm) refuse("the rig's camera_from_rcm");
   if (!tool || !tool->place) refuse("the rig's `tool` with its place");
   if (!has_joints || wrist_.size() == tool->wrist.size()) return;
-  std::vector<std::string> names;
-  for (const WristJoint& joint : tool->wrist) names.push_back(joint.name);
-  refuse(fmt::format("the wrist's joints, but the arm does not measure {}", fmt::join(names, ", ")));
+  refuse(fmt::format("the wrist's joints, but the arm does not measure {}", fmt::join(wrist_names(*tool), ", ")));
 }
 
 void TipGoals::use(const std::optional<Rigid3>& camera_from_rcm) {
@@ -114,7 +113,7 @@ void TipGoals::see(const ImageMeasurement& image, const Rigid3& camera_from_rcm)
     psi_by_ = tip_wanted_ ? PsiBy::goal : PsiBy::image;
   }
   const Rigid3 camera_from_marker =
-      marker_pose_at(camera_from_rcm, rig_.instruments[0].marker, JointVector::from_vector(shown->q));
+      lapservo::camera_from_marker(rig_.instruments[0].marker, camera_from_rcm, JointVector::from_vector(shown->q));
   const Eigen::Vector3d seen_m = *image.camera_from_marker * tip->translation,
                         there_m = camera_from_marker * tip->translation;
   if (!(std::min(seen_m.z(), there_m.z()) > nearest_m)) return;
@@ -143,7 +142,7 @@ std::optional<JointVector> TipGoals::configuration(const TipGoal& goal, double a
 std::optional<Eigen::Vector3d> TipGoals::tip_at(const JointVector& q) const {
   const auto tip = marker_from_tip(0);
   if (!tip || !camera_from_rcm_) return std::nullopt;
-  return marker_pose_at(*camera_from_rcm_, rig_.instruments[0].marker, q) * tip->translation;
+  return lapservo::camera_from_marker(rig_.instruments[0].marker, *camera_from_rcm_, q) * tip->translation;
 }
 
 std::optional<Eigen::Vector2d> TipGoals::error_px(const ImageMeasurement& image, const TipGoal& goal,

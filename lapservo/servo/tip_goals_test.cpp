@@ -48,7 +48,7 @@ struct Truth {
   Rig rig;
 
   Rigid3 camera_from_marker(const JointVector& q) const {
-    return marker_pose_at(*rig.instruments[0].camera_from_rcm, rig.instruments[0].marker, q);
+    return lapservo::camera_from_marker(rig.instruments[0].marker, *rig.instruments[0].camera_from_rcm, q);
   }
   Eigen::Vector3d tip_at(const JointVector& q, const std::vector<double>& wrist_rad) const {
     return camera_from_marker(q) * tip_in_marker(*rig.instruments[0].tool, wrist_rad).marker_from_tip.translation;

@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 
 #include "lapservo/core/error.h"
-#include "lapservo/tool/expect_wrist.h"
+#include "lapservo/tool/wrist.h"
 
 namespace lapservo {
 namespace {
@@ -56,6 +56,12 @@ Covariance place_covariance(const Tool::PlaceCovariance& place, const Motion& by
 }
 
 }  // namespace
+
+std::vector<std::string> internal::wrist_names(const Tool& tool) {
+  std::vector<std::string> names;
+  for (const WristJoint& joint : tool.wrist) names.push_back(joint.name);
+  return names;
+}
 
 void internal::expect_wrist(const Tool& tool, std::span<const double> wrist_rad) {
   if (wrist_rad.size() != tool.wrist.size())

@@ -6,7 +6,7 @@
 #include "lapservo/core/error.h"
 #include "lapservo/core/words.h"
 #include "lapservo/rig/check_rig.h"
-#include "lapservo/tool/expect_wrist.h"
+#include "lapservo/tool/wrist.h"
 #include "lapservo/vision/image/image_view.h"
 #include "lapservo/vision/image/interlacing.h"
 #include "lapservo/vision/paper/centerline.h"

@@ -71,8 +71,7 @@ q is float[4]: theta, phi [rad], rho [m], psi [rad]; features are float[4]: s [r
         if (!instrument.camera_from_rcm)
           throw InputError("camera_from_marker", "camera_from_rcm", "missing", "an instrument that has one");
         const JointVector joints = JointVector::from_vector(q.value);
-        return matrix_of(camera_from_marker(instrument.marker, *instrument.camera_from_rcm * rcm_from_unrolled(joints),
-                                            joints.psi_rad));
+        return matrix_of(camera_from_marker(instrument.marker, *instrument.camera_from_rcm, joints));
       },
       py::arg("instrument"), py::arg("q"), "float[4, 4], metres: the marker's pose at a configuration.");
 

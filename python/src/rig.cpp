@@ -13,6 +13,7 @@
 #include "lapservo/core/error.h"
 #include "lapservo/rig/camera_formats.h"
 #include "lapservo/rig/rig_writer.h"
+#include "lapservo/tool/wrist.h"
 #include "python/src/bindings.h"
 #include "python/src/conversions.h"
 #include "python/src/state.h"
@@ -183,10 +184,7 @@ q = sign * joints + offset, rad and m.)");
       .def_property_readonly(
           "wrist_joints",
           [](const Instrument& instrument) {
-            std::vector<std::string> names;
-            if (instrument.tool)
-              for (const WristJoint& joint : instrument.tool->wrist) names.push_back(joint.name);
-            return names;
+            return instrument.tool ? internal::wrist_names(*instrument.tool) : std::vector<std::string>();
           },
           "list[str]: the joints of the tool's wrist, in the order of Tracker.set_wrist; empty for a straight tool")
       .def("__repr__", [](const Instrument& instrument) { return "<lapservo.Instrument '" + instrument.name + "'>"; });

@@ -1,7 +1,6 @@
 #include "apps/lapservo/inputs/joint_input.h"
 
 #include <algorithm>
-#include <array>
 #include <cstddef>
 #include <memory>
 #include <utility>
@@ -13,6 +12,8 @@
 #include "apps/lapservo/inputs/frame_input.h"
 #include "lapservo/core/csv.h"
 #include "lapservo/core/error.h"
+#include "lapservo/crtk/joint_map.h"
+#include "lapservo/tool/wrist.h"
 #include "recordings/bag_joints.h"
 #include "recordings/bag_topics.h"
 #include "recordings/open_bag.h"
@@ -49,6 +50,20 @@ JointInput read_topic(const CalibrateOptions& options, const Instrument& instrum
   return reported({joints, joints_in_bag(bag, topic, joints, begin_s), bag.path()});
 }
 
+// A wrist's joints by the names that they are recorded with, repeated up to four.
+std::optional<Joints> wrist_joints(const Tool& tool, const std::vector<std::string>& recorded) {
+  const std::vector<std::string> names = wrist_names(tool);
+  Joints joints;
+  for (std::size_t i = 0; i < joints.names.size(); ++i) {
+    const auto found = std::find_if(recorded.begin(), recorded.end(), [&](const std::string& name) {
+      return is_same_joint(name, names[i % names.size()]);
+    });
+    if (found == recorded.end()) return std::nullopt;
+    joints.names[i] = *found;
+  }
+  return joints;
+}
+
 std::optional<JointInput> read_wrist_topic(const std::string& path, const std::string& joint_topic,
                                            const Instrument& instrument, const FrameSource* frames) {
   const auto bag = open_bag(path);
@@ -60,18 +75,6 @@ std::optional<JointInput> read_wrist_topic(const std::string& path, const std::s
 }
 
 }  // namespace
-
-std::optional<Joints> wrist_joints(const Tool& tool, const std::vector<std::string>& recorded) {
-  Joints joints;
-  for (std::size_t i = 0; i < joints.names.size(); ++i) {
-    const std::string& name = tool.wrist[i % tool.wrist.size()].name;
-    const std::array<std::string, 2> names{name, "outer_" + name};
-    const auto found = std::find_first_of(recorded.begin(), recorded.end(), names.begin(), names.end());
-    if (found == recorded.end()) return std::nullopt;
-    joints.names[i] = *found;
-  }
-  return joints;
-}
 
 std::optional<JointInput> find_wrist_input(const std::string& input, const std::string& joints,
                                            const std::string& joint_topic, const Instrument& instrument,
@@ -96,10 +99,8 @@ std::string no_tip_text(const Instrument& instrument, bool wrist_is_read) {
   if (!instrument.tool->place)
     return "the rig does not say where the tool sits behind the marker: lapservo calibrate tip measures it";
   if (instrument.tool->wrist.empty() || wrist_is_read) return "";
-  std::vector<std::string> names;
-  for (const WristJoint& joint : instrument.tool->wrist) names.push_back(joint.name);
   return fmt::format("no readings of the wrist's joints {}: --joints names a recording or topic that has them",
-                     fmt::join(names, ", "));
+                     fmt::join(wrist_names(*instrument.tool), ", "));
 }
 
 void add_joint_options(Command command, CalibrateOptions& options, const std::string& help) {

@@ -28,11 +28,8 @@ JointInput read_joint_input(const CalibrateOptions& options, const Instrument& i
 std::optional<JointInput> find_joint_input(const CalibrateOptions& options, const Instrument& instrument,
                                            const FrameSource* frames);
 
-/// A wrist's joints by the names that they are recorded with, also those of dVRK before 2.3, repeated up to four;
-/// nullopt where one is missing.
-std::optional<Joints> wrist_joints(const Tool& tool, const std::vector<std::string>& recorded);
-
-/// The readings of these during the frames. `joints`: of --joints, else `input`, where it is a bag. Nullopt without.
+/// The readings of the joints of the tool's wrist during the frames. `joints`: of --joints, else `input`, where it is a
+/// bag. Nullopt without.
 std::optional<JointInput> find_wrist_input(const std::string& input, const std::string& joints,
                                            const std::string& joint_topic, const Instrument& instrument,
                                            const FrameSource* frames);

@@ -1,12 +1,11 @@
 #include "apps/lapservo/inputs/live_wrist.h"
 
-#include <algorithm>
 #include <cmath>
-#include <cstddef>
 #include <utility>
 
-#include "apps/lapservo/inputs/joint_input.h"
 #include "apps/lapservo/inputs/transports.h"
+#include "lapservo/crtk/joint_map.h"
+#include "lapservo/tool/wrist.h"
 
 namespace lapservo::app {
 using namespace internal;
@@ -23,14 +22,12 @@ LiveWrist::LiveWrist(const std::string& topic) {
 std::vector<double> LiveWrist::newest(const Tool& tool) const {
   constexpr double too_old_s = 0.5;
   const std::lock_guard lock(mutex_);
-  const auto joints = tool.wrist.empty() ? std::nullopt : wrist_joints(tool, latest_.names);
-  if (!joints || latest_.positions.size() != latest_.names.size() || clock_.now_s() - came_s_ > too_old_s) return {};
-  std::vector<double> readings_rad;
-  for (std::size_t i = 0; i < tool.wrist.size(); ++i) {
-    const auto found = std::find(latest_.names.begin(), latest_.names.end(), joints->names[i]);
-    readings_rad.push_back(latest_.positions[static_cast<std::size_t>(found - latest_.names.begin())]);
-    if (!std::isfinite(readings_rad.back())) return {};
-  }
+  const std::vector<std::string> names = wrist_names(tool);
+  if (names.empty() || latest_.positions.size() != latest_.names.size() || clock_.now_s() - came_s_ > too_old_s)
+    return {};
+  std::vector<double> readings_rad = wrist_in(latest_, names);
+  for (const double reading_rad : readings_rad)
+    if (!std::isfinite(reading_rad)) return {};
   return readings_rad;
 }
 

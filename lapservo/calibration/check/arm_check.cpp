@@ -49,7 +49,7 @@ Told drift_of_directions(const ArmFit& f) {
 Rigid3 marker_at(const Instrument& instrument, const Rigid3& camera_from_rcm, const Joints& joints,
                  const std::array<double, 4>& at) {
   const auto q = JointVector::from_vector(q_from_joints(joints, Eigen::Vector4d(at.data())));
-  return camera_from_marker(instrument.marker, camera_from_rcm * rcm_from_unrolled(q), q.psi_rad);
+  return camera_from_marker(instrument.marker, camera_from_rcm, q);
 }
 
 ArmResidual difference(const Camera& camera, const Marker& marker, double time_s, const Rigid3& expected,

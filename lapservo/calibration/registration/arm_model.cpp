@@ -139,7 +139,7 @@ double ArmModel::focal_change(const Eigen::VectorXd& x) const {
 
 Eigen::Matrix<double, 6, 1> ArmModel::difference(const TimedPose& pose, const Rigid3& camera_from_rcm,
                                                  const JointVector& q, const Eigen::VectorXd& x) const {
-  const Rigid3 expected = camera_from_marker(marker_, camera_from_rcm * rcm_from_unrolled(q), q.psi_rad);
+  const Rigid3 expected = camera_from_marker(marker_, camera_from_rcm, q);
   const Observation::MarkerPose& seen = pose.marker;
   const double focal = focal_change(x);
   const Eigen::Vector3d origin = pose.origin() + focal * pose.by_focal.origin_m;

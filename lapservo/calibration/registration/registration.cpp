@@ -133,7 +133,7 @@ Rigid3 placed(const Marker& marker, const Registration& registration, const std:
   camera_from_rcm.rotation = camera_from_rcm.rotation * rotation_by(off.head<3>());
   camera_from_rcm.translation += off.segment<3>(3);
   const auto q = JointVector::from_vector(q_from_joints(joints, Eigen::Vector4d(readings.data())));
-  return camera_from_marker(marker, camera_from_rcm * rcm_from_unrolled(q), q.psi_rad);
+  return camera_from_marker(marker, camera_from_rcm, q);
 }
 
 }  // namespace

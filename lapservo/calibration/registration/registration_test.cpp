@@ -29,7 +29,7 @@ using lapservo::testing::input_error;
 // Where an arm as the instrument has it puts the marker.
 Rigid3 marker_at(const Instrument& instrument, const std::array<double, 4>& readings) {
   const auto q = JointVector::from_vector(q_from_joints(*instrument.joints, Eigen::Vector4d(readings.data())));
-  return camera_from_marker(instrument.marker, *instrument.camera_from_rcm * rcm_from_unrolled(q), q.psi_rad);
+  return camera_from_marker(instrument.marker, *instrument.camera_from_rcm, q);
 }
 
 bool has(const std::string& text, const std::string& part) {

@@ -1,10 +1,15 @@
 #pragma once
 
 #include <span>
+#include <string>
+#include <vector>
 
 #include "lapservo/tool/tool.h"
 
 namespace lapservo::internal {
+
+/// The names of the wrist's joints, from the shaft to the tip; none for a straight tool.
+std::vector<std::string> wrist_names(const Tool& tool);
 
 /// Throws InputError for another number of readings than the wrist has joints, and for one that is not finite.
 void expect_wrist(const Tool& tool, std::span<const double> wrist_rad);
