@@ -144,7 +144,7 @@ class Guide {
     CalibrateCameraOptions camera;
     static_cast<FrameOptions&>(camera) = options_;
     camera.inputs = {options.input}, camera.rig = options.rig;
-    camera.board = options_.board, camera.square_mm = options_.square_mm, camera.dictionary = options_.aruco;
+    camera.board = {options_.board, options_.aruco, options_.square_mm, {}};
     return calibrate_camera(camera);
   }
 

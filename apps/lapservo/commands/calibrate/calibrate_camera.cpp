@@ -26,12 +26,6 @@ using namespace internal;
 namespace {
 namespace fs = std::filesystem;
 
-Board board_of(const CalibrateCameraOptions& options) {
-  BoardWords words{options.board, 1e-3 * options.square_mm.value(), options.dictionary};
-  if (options.marker_mm) words.marker_m = 1e-3 * *options.marker_mm;
-  return internal::board_of(words);
-}
-
 void check_files(const CalibrateCameraOptions& options, const std::optional<Rig>& rig) {
   if (options.rig.empty() && options.out.empty() && options.camera_info.empty())
     throw InputError("calibrate camera", "has no place for its result, expected --rig, --out or --camera-info");
@@ -105,7 +99,7 @@ void write_results(const CalibrateCameraOptions& options, std::optional<Rig> rig
 }  // namespace
 
 int calibrate_camera(const CalibrateCameraOptions& options) {
-  const Board board = board_of(options);
+  const Board board = board_of(options.board);
   std::optional<Rig> rig;
   if (!options.rig.empty()) rig = load_rig(options.rig);
   check_files(options, rig);
@@ -141,11 +135,7 @@ void add_calibrate_camera(Command parent, Run& run_later) {
       .required();
   add_image_topic_option(command, options->image_topic);
   add_video_options(command, *options);
-  command.add_option("--board", options->board, "Inner corners of the board, COLUMNSxROWS, for example 9x6").required();
-  command.add_option("--square-mm", options->square_mm, "Width of a square").required().number_between(0.1, 1000.0);
-  command.add_option("--aruco", options->dictionary, "For a ChArUco board: its markers' dictionary, as DICT_4X4_50");
-  command.add_option("--marker-mm", options->marker_mm, "For a ChArUco board: a marker's width; else 3/4 of a square")
-      .number_between(0.05, 1000.0);
+  add_board_options(command, options->board, true);
   command.add_option("--rig", options->rig, "The rig that has this camera: its response is where the search starts");
   command.add_option("--out", options->out,
                      "With --rig: the rig to write, else the rig itself is replaced. Without: the camera's file");

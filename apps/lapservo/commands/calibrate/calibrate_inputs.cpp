@@ -21,6 +21,24 @@ namespace lapservo::app {
 using namespace internal;
 namespace fs = std::filesystem;
 
+void add_board_options(Command command, BoardOptions& options, bool required) {
+  auto corners =
+      command.add_option("--board", options.corners, "Inner corners of the board, COLUMNSxROWS, for example 9x6");
+  auto squares = command.add_option("--square-mm", options.square_mm, "Width of a square").number_between(0.1, 1000.0);
+  if (required) corners.required(), squares.required();
+  command.add_option("--aruco", options.dictionary, "For a ChArUco board: its markers' dictionary, as DICT_4X4_50");
+  command.add_option("--marker-mm", options.marker_mm, "For a ChArUco board: a marker's width; else 3/4 of a square")
+      .number_between(0.05, 1000.0);
+}
+
+Board board_of(const BoardOptions& options) {
+  if (options.corners.empty() || !options.square_mm)
+    throw InputError("--board", "needs --square-mm beside it, for example --board 9x6 --square-mm 5");
+  BoardWords words{options.corners, 1e-3 * *options.square_mm, options.dictionary};
+  if (options.marker_mm) words.marker_m = 1e-3 * *options.marker_mm;
+  return internal::board_of(words);
+}
+
 void add_calibrate_options(Command command, CalibrateOptions& options) {
   command.add_option("--rig", options.rig, "The rig as it is known so far").required();
   command.add_option("--out", options.out, "The rig to write or replace, with what was measured; may be --rig's")

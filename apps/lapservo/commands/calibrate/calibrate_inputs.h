@@ -1,11 +1,13 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "apps/lapservo/cli/subcommands.h"
 #include "apps/lapservo/commands/calibrate/dvrk_output.h"
 #include "apps/lapservo/inputs/frame_input.h"
+#include "lapservo/calibration/camera/camera_measurement.h"
 #include "lapservo/calibration/recording/frame_recording.h"
 #include "lapservo/rig/rig.h"
 
@@ -16,6 +18,15 @@ struct CalibrateOptions : FrameOptions {
   std::string input, rig, out, instrument, joints, report, joint_topic;
   DvrkOptions dvrk;  ///< of registration only
 };
+
+/// A board as its options describe it.
+struct BoardOptions {
+  std::string corners, dictionary;
+  std::optional<double> square_mm, marker_mm;
+};
+void add_board_options(Command command, BoardOptions& options, bool required);
+/// Throws InputError without corners or squares.
+internal::Board board_of(const BoardOptions& options);
 
 /// All but the input and the joints, which each subcommand describes itself.
 void add_calibrate_options(Command command, CalibrateOptions& options);

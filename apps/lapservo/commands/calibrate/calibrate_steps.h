@@ -11,8 +11,8 @@ namespace lapservo::app {
 
 struct CalibrateCameraOptions : FrameOptions {
   std::vector<std::string> inputs;
-  std::string rig, out, camera_info, board, dictionary;
-  std::optional<double> square_mm, marker_mm;
+  std::string rig, out, camera_info;
+  BoardOptions board;
   std::size_t views = 30;
 
   /// Where the rig goes; empty without one.

@@ -29,8 +29,8 @@ using namespace internal;
 namespace {
 
 struct CalibrateTipOptions : CalibrateOptions {
-  std::string pivot, touches, calliper, board, dictionary;
-  std::optional<double> square_mm, marker_mm;
+  std::string pivot, touches, calliper;
+  BoardOptions board;
 };
 
 TipCalibration by_pivot(const CalibrateTipOptions& options, const Rig& rig, std::size_t index, const Tool& tool) {
@@ -44,11 +44,9 @@ TipCalibration by_pivot(const CalibrateTipOptions& options, const Rig& rig, std:
 }
 
 TipCalibration by_touch(const CalibrateTipOptions& options, const Rig& rig, std::size_t index, const Tool& tool) {
-  if (options.board.empty() || !options.square_mm)
+  if (options.board.corners.empty() || !options.board.square_mm)
     throw InputError("--touch", "needs --board and --square-mm, for example --board 9x6 --square-mm 5");
-  BoardWords words{options.board, 1e-3 * *options.square_mm, options.dictionary};
-  if (options.marker_mm) words.marker_m = 1e-3 * *options.marker_mm;
-  const Board board = board_of(words);
+  const Board board = board_of(options.board);
   const auto measured = measure_touches(rig, index, tool, board, read_touches(options.input, board, tool),
                                         options.deinterlace, watched_job());
   for (const std::string& image : measured.without_marker) std::printf("left out: %s\n", image.c_str());
@@ -134,11 +132,7 @@ void add_calibrate_tip(Command parent, Run& run_later) {
   command.add_option("--calliper", options->calliper,
                      "MM[:SIGMA]: distance of the marker's distal edge from the wrist's axis, or from a straight "
                      "tool's tip, by callipers; sigma is 0.1 mm if not given");
-  command.add_option("--board", options->board, "Inner corners of the board, COLUMNSxROWS, for example 9x6");
-  command.add_option("--square-mm", options->square_mm, "Width of a square").number_between(0.1, 1000.0);
-  command.add_option("--aruco", options->dictionary, "For a ChArUco board: its markers' dictionary, as DICT_4X4_50");
-  command.add_option("--marker-mm", options->marker_mm, "For a ChArUco board: a marker's width; else 3/4 of a square")
-      .number_between(0.05, 1000.0);
+  add_board_options(command, options->board, false);
   add_calibrate_options(command, *options);
   command.footer(
       "The rig's camera and marker must be calibrated; a rig without a tool gets a straight one. With --pivot, tilt "
