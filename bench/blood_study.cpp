@@ -1,6 +1,8 @@
 #include "bench/accuracy_study.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/core/random.h"
+#include "lapservo/geometry/rotation.h"
+#include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/sim/blood.h"
 #include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/tissue.h"
@@ -15,6 +17,8 @@ struct Condition {
   double steepest_rad = 0;  ///< anywhere in view; 0: near, as the samples of heavy blood are
   bool tracked = false;     ///< ten frames of an instrument that rotated in clear view before; else single images
   Off off = Off::nowhere;
+  double hidden = 0.4;  ///< of the marker
+  bool registered = true;
 };
 const std::vector<Condition> conditions{
     {.name = "near"},
@@ -22,7 +26,10 @@ const std::vector<Condition> conditions{
     {.name = "leaning_50_degrees", .steepest_rad = 0.87},
     {.name = "tracked", .steepest_rad = 0.35, .tracked = true},
     {.name = "tracked_bands_off", .steepest_rad = 0.35, .tracked = true, .off = Off::bands},
-    {.name = "tracked_ink_aside", .steepest_rad = 0.35, .tracked = true, .off = Off::middle_ink}};
+    {.name = "tracked_ink_aside", .steepest_rad = 0.35, .tracked = true, .off = Off::middle_ink},
+    {.name = "unregistered_clear", .steepest_rad = 0.87, .hidden = 0, .registered = false},
+    {.name = "unregistered_near", .registered = false},
+    {.name = "unregistered_leaning", .steepest_rad = 0.87, .registered = false}};
 
 JointVector configuration(const Rig& rig, double steepest_rad, Random& random) {
   if (steepest_rad == 0)
@@ -31,15 +38,28 @@ JointVector configuration(const Rig& rig, double steepest_rad, Random& random) {
   return random_configurations(rig, 1, random.bits(), steepest_rad)[0][0];
 }
 
+// Gives observations without a registration the q of the true one.
+std::vector<Observation> with_q(std::vector<Observation> seen, const Instrument& instrument) {
+  for (Observation& one : seen) {
+    if (one.rcm || !one.marker) continue;
+    const Rigid3& pose = one.marker->camera_from_marker;
+    auto q = configuration_through(*instrument.camera_from_rcm, pose.translation).value();
+    const Rigid3 unturned = camera_from_marker(instrument.marker, *instrument.camera_from_rcm, q);
+    q.psi_rad = wrap_pi(rotation_vector_of(unturned.rotation.conjugate() * pose.rotation).z());
+    one.rcm.emplace().q = q;
+    one.rcm->covariance = Eigen::Matrix4d::Identity() * std::pow(one.marker->sigma_roll_rad, 2);
+  }
+  return seen;
+}
+
 // An instrument and its print, clear for some frames and bloody for others, while it turns.
 class Sequence {
  public:
   Sequence(const Rig& rig, const Condition& condition, std::uint64_t seed) : rig_(rig), printed_(rig), random_(seed) {
-    constexpr double hidden = 0.4;
     q_ = configuration(rig, condition.steepest_rad, random_);
     Marker& print = printed_.instruments[0].marker;
     print = off_print(print, condition.off, random_);
-    bloody_ = blood_over(print, hidden, random_);
+    bloody_ = blood_over(print, condition.hidden, random_);
     tissue_ = make_tissue(rig.camera.width_px, rig.camera.height_px, random_.bits());
     step_rad_ = random_.uniform(0.02, 0.12);
   }
@@ -52,7 +72,7 @@ class Sequence {
                       renderer.render({placement_of(rig_.instruments[0], q_)}, random_.bits()),
                       {truth_of(printed_, 0, q_)}};
       take_print_for(frame, rig_.instruments[0].marker);
-      score.add(frame, tracker.track(frame.bgr));
+      score.add(frame, with_q(tracker.track(frame.bgr), rig_.instruments[0]));
     }
   }
 
@@ -70,7 +90,9 @@ Score score_condition(const Condition& condition, int count, std::uint64_t seed)
   const Rig rig = example_rig();
   Score clear, bloody;
   for (int i = 0; i < count; ++i) {
-    Tracker tracker(rig, {.method = Method::surface, .single = !condition.tracked});
+    Rig known = rig;
+    if (!condition.registered) known.instruments[0].camera_from_rcm.reset();
+    Tracker tracker(known, {.method = Method::surface, .single = !condition.tracked});
     Sequence sequence(rig, condition, 100'000 * seed + static_cast<std::uint64_t>(i));
     if (condition.tracked) sequence.show(tracker, false, clear_frames, clear);
     sequence.show(tracker, true, condition.tracked ? bloody_frames : 1, bloody);

@@ -10,8 +10,7 @@
 #include "lapservo/vision/decision/verification.h"
 #include "lapservo/vision/image/light_image.h"
 #include "lapservo/vision/search/coarse_fit.h"
-#include "lapservo/vision/search/initial_pose.h"
-#include "lapservo/vision/search/rcm_starts.h"
+#include "lapservo/vision/search/starts.h"
 
 namespace lapservo::internal {
 namespace {
@@ -91,11 +90,12 @@ std::optional<Sighting> MarkerSurvey::detect(const Scene& scene, const LightImag
     const double score = colour_agreement(scene, sighting->unknowns.pose()).matching + sighting->settled;
     if (score > best_score) best_score = score, best = sighting;
   };
+  const auto& camera_from_rcm = rig_.instruments[instrument_].camera_from_rcm;
   for (const Blob& blob : blobs) {
-    if (const auto& camera_from_rcm = rig_.instruments[instrument_].camera_from_rcm)
-      for (const PoseUnknowns& start : starts_through_rcm(scene, blob, *camera_from_rcm)) try_start(start);
+    if (camera_from_rcm)
+      for (const PoseUnknowns& start : starts_in(scene, blob, camera_from_rcm).poses) try_start(start);
     if (!best || !best->settled)
-      for (const PoseUnknowns& start : initial_poses(scene, blob).poses) try_start(start);
+      for (const PoseUnknowns& start : starts_in(scene, blob, std::nullopt).poses) try_start(start);
     if (best && best->settled) break;
   }
   return best;

@@ -8,8 +8,7 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/kinematics/centre_line.h"
 #include "lapservo/testing/scenes.h"
-#include "lapservo/vision/search/initial_pose.h"
-#include "lapservo/vision/search/rcm_starts.h"
+#include "lapservo/vision/search/starts.h"
 
 namespace lapservo::internal {
 namespace {
@@ -93,9 +92,9 @@ TEST(InitialPoses, LieNearTheTruth) {
       const Shot& shot = usual_shot(seed);
       const auto blobs = find_blobs(shot.sight.view(), shot.sight.classes(), 8, 8);
       ASSERT_FALSE(blobs.empty());
-      const auto poses =
-          rcm ? starts_through_rcm(shot.sight.scene(), blobs[0], *shot.rig.instruments[0].camera_from_rcm)
-              : initial_poses(shot.sight.scene(), blobs[0]).poses;
+      const auto poses = starts_in(shot.sight.scene(), blobs[0],
+                                   rcm ? shot.rig.instruments[0].camera_from_rcm : std::optional<Rigid3>())
+                             .poses;
       ASSERT_FALSE(poses.empty());
       double nearest_px = 1e9;
       for (const PoseUnknowns& unknowns : poses) {
@@ -119,8 +118,8 @@ TEST(InitialPoses, AreNoneForABlobWithoutTheMarkersColoursInTheirOrder) {
   Blob blob;  // of one colour only
   blob.grid_px = 8;
   for (int i = 0; i < 30; ++i) blob.samples.push_back({300 + 8 * (i % 6), 200 + 8 * (i / 6), 1});
-  EXPECT_TRUE(initial_poses(shot.sight.scene(), blob).poses.empty());
-  EXPECT_TRUE(initial_poses(shot.sight.scene(), Blob{}).poses.empty());
+  EXPECT_TRUE(starts_in(shot.sight.scene(), blob, std::nullopt).poses.empty());
+  EXPECT_TRUE(starts_in(shot.sight.scene(), Blob{}, std::nullopt).poses.empty());
 }
 
 }  // namespace

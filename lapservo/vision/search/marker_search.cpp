@@ -8,8 +8,7 @@
 #include "lapservo/vision/decision/displaced_boundary.h"
 #include "lapservo/vision/decision/verification.h"
 #include "lapservo/vision/search/coarse_fit.h"
-#include "lapservo/vision/search/initial_pose.h"
-#include "lapservo/vision/search/rcm_starts.h"
+#include "lapservo/vision/search/starts.h"
 
 namespace lapservo::internal {
 namespace {
@@ -67,8 +66,7 @@ Found try_start(const Scene& scene, const LightImage& light, const PoseUnknowns&
 
 // Two fits of one marker that are both ok: of what blood leaves both can't be sure.
 bool are_rivals(const FineFit& fit, const FineFit& other) {
-  const double turn_rad = wrap_pi(fit.unknowns.pose().psi_rad - other.unknowns.pose().psi_rad);
-  return std::abs(turn_rad) > Observation::false_rad;
+  return std::abs(wrap_pi(fit.unknowns.change_to(other.unknowns)[psi_unknown])) > Observation::false_rad;
 }
 
 // No marker moves farther from frame to frame.
@@ -77,17 +75,14 @@ double reach_px(const SearchFrame& frame) {
   return of_width * frame.scene.image.width_px;
 }
 
-double cost_of_starts(const SearchFrame& frame) {
-  return costs.starts_in_blob(!frame.scene.others.empty());
+double cost_of_starts(const SearchFrame& frame, bool through_rcm) {
+  return costs.starts_in_blob(through_rcm, !frame.scene.others.empty());
 }
 
-InitialPoses starts_in(const SearchFrame& frame, bool through_rcm, const Blob& blob, WorkBudget& budget) {
-  InitialPoses starts;
-  if (through_rcm)
-    starts.poses = starts_through_rcm(frame.scene, blob, frame.camera_from_rcm());
-  else
-    starts = initial_poses(frame.scene, blob);
-  budget.spend(starts.poses.empty() ? costs.no_starts : cost_of_starts(frame));
+Starts starts_in(const SearchFrame& frame, bool through_rcm, const Blob& blob, WorkBudget& budget) {
+  Starts starts =
+      starts_in(frame.scene, blob, through_rcm ? std::optional(frame.camera_from_rcm()) : std::optional<Rigid3>());
+  budget.spend(starts.poses.empty() ? costs.no_starts : cost_of_starts(frame, through_rcm));
   return starts;
 }
 
@@ -103,19 +98,20 @@ Found follow(const Scene& scene, const LightImage& light, const PoseUnknowns& ex
   return fitted_from(scene, light, expected.with_rcm(false), blur, processing, budget);
 }
 
-// The starts of one blob, until one fits. Without the RCM they are rivals: all are tried then, in one frame.
+// The starts of one blob, until one fits. Rivals are all tried, in one frame.
 Found MarkerSearch::detect_in_blob(const SearchFrame& frame, bool through_rcm, const Blob& blob, Walk& walk,
                                    WorkBudget& budget) {
   Found best;
+  bool has_rivals = false;
   const std::size_t first = walk.blobs.start();
-  if (!budget.allows(cost_of_starts(frame) + costs.try_start())) {
+  if (!budget.allows(cost_of_starts(frame, through_rcm) + costs.try_start())) {
     walk.blobs.stop(blob, first);
     return best;
   }
-  const auto [starts, other_bands] = starts_in(frame, through_rcm, blob, budget);
+  const auto [starts, rivals, other_bands] = starts_in(frame, through_rcm, blob, budget);
   walk.other_bands |= other_bands;
-  for (std::size_t i = first; i < starts.size(); ++i) {
-    if (through_rcm && i > first && !budget.allows(costs.try_start())) {
+  for (std::size_t i = first; i < starts.size() && (i < rivals || !best.fit); ++i) {
+    if (i > first && i >= rivals && !budget.allows(costs.try_start())) {
       walk.blobs.stop(blob, i);
       return best;
     }
@@ -126,11 +122,11 @@ Found MarkerSearch::detect_in_blob(const SearchFrame& frame, bool through_rcm, c
       if (!best.fit && found.status != Status::no_marker) best = found;
       continue;
     }
+    has_rivals |= best.fit && are_rivals(*best.fit, *found.fit);
     if (!best.fit || found.fit->misfit() < best.fit->misfit()) best = std::move(found);
-    if (through_rcm) break;
   }
   walk.blobs.finish(blob);
-  return best;
+  return has_rivals ? refusal(Status::ambiguous, best.fit->unknowns) : best;
 }
 
 Found MarkerSearch::detect(const SearchFrame& frame, bool through_rcm, Walk& walk, WorkBudget& budget) {
@@ -282,7 +278,7 @@ Found MarkerSearch::look_with_rcm(const SearchFrame& frame, WorkBudget& budget) 
   const WorkBudget::Beyond step = budget.allowed();
   // Half the budget, or by turns what a start takes, is for what shows plainly.
   longs_turn_ = searches_long_ && !longs_turn_;
-  const double half = budget.left() / 2, one_start = cost_of_starts(frame) + costs.try_start();
+  const double half = budget.left() / 2, one_start = cost_of_starts(frame, true) + costs.try_start();
   const double share = !searches_long_ ? budget.left() : longs_turn_ ? half : std::max(half, one_start);
   Found plain = budget.share(share, longs_turn_ ? WorkBudget::Beyond::none : step,
                              [&](WorkBudget& part) { return detect(frame, true, plain_, part); });

@@ -50,7 +50,7 @@ class MarkerSearch {
   struct Walk {
     BlobWalk blobs;
     bool done = false;
-    bool other_bands = false;  // InitialPoses
+    bool other_bands = false;  // Starts
   };
   enum class Rival { none, found, not_known_yet };
 

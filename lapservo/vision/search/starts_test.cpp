@@ -1,3 +1,5 @@
+#include "lapservo/vision/search/starts.h"
+
 #include <cmath>
 #include <string>
 #include <vector>
@@ -7,8 +9,6 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/testing/scenes.h"
 #include "lapservo/vision/search/explained_colours.h"
-#include "lapservo/vision/search/initial_pose.h"
-#include "lapservo/vision/search/rcm_starts.h"
 
 namespace lapservo::internal {
 namespace starts_test {
@@ -43,11 +43,11 @@ Blob largest_blob(const Shot& shot) {
   return largest_blobs(shot.sight.view(), shot.sight.classes()).at(0);
 }
 
-TEST(Starts, ABlobsOutlineTellsThePose) {
+TEST(Starts, ABlobTellsThePose) {
   for (std::uint64_t seed = 1; seed <= shots; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     const Shot& shot = usual_shot(seed);
-    const InitialPoses free = initial_poses(shot.sight.scene(), largest_blob(shot));
+    const Starts free = starts_in(shot.sight.scene(), largest_blob(shot), std::nullopt);
     EXPECT_TRUE(any_is_near(shot, free.poses));
     for (const PoseUnknowns& start : free.poses) EXPECT_FALSE(start.through_rcm());
     EXPECT_FALSE(free.other_bands);
@@ -59,7 +59,7 @@ TEST(Starts, LinesThroughTheRcmTellThePose) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     const Shot& shot = usual_shot(seed);
     const Rigid3& camera_from_rcm = *shot.rig.instruments[0].camera_from_rcm;
-    const auto starts = starts_through_rcm(shot.sight.scene(), largest_blob(shot), camera_from_rcm);
+    const auto starts = starts_in(shot.sight.scene(), largest_blob(shot), camera_from_rcm).poses;
     EXPECT_LE(starts.size(), 3U);
     EXPECT_TRUE(any_is_near(shot, starts));
   }
@@ -78,8 +78,9 @@ TEST(Starts, ASideBeyondTheBorderIsADiameterFromTheOther) {
     SCOPED_TRACE("so many radii beside the axis: " + std::to_string(shown));
     rig.camera.height_px = static_cast<int>(axis_px + shown * radius_px);
     const scenes::Sight sight(rig, whole.rowRange(0, rig.camera.height_px));
-    const auto starts = starts_through_rcm(sight.scene(), largest_blobs(sight.view(), sight.classes()).at(0),
-                                           *rig.instruments[0].camera_from_rcm);
+    const auto starts =
+        starts_in(sight.scene(), largest_blobs(sight.view(), sight.classes()).at(0), rig.instruments[0].camera_from_rcm)
+            .poses;
     ASSERT_FALSE(starts.empty());
     const Rigid3& pose = starts[0].pose().camera_from_unrolled;
     EXPECT_NEAR(rig.camera.raw_from_point(pose.translation).y(), axis_px, 0.25 * radius_px);
@@ -94,8 +95,8 @@ TEST(Starts, AnotherOrderOfColoursIsNoStart) {
     const Shot& shot = usual_shot(seed);
     Scene another = shot.sight.scene();
     std::swap(another.bands[1], another.bands[2]);
-    EXPECT_TRUE(initial_poses(another, largest_blob(shot)).poses.empty());
-    EXPECT_TRUE(starts_through_rcm(another, largest_blob(shot), *shot.rig.instruments[0].camera_from_rcm).empty());
+    for (const auto& rcm : {shot.rig.instruments[0].camera_from_rcm, std::optional<Rigid3>()})
+      EXPECT_TRUE(starts_in(another, largest_blob(shot), rcm).poses.empty());
   }
 }
 

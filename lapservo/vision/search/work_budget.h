@@ -55,12 +55,15 @@ struct SearchCosts {
   double processing = 2400;                      ///< where the first guess at a camera's processing is not enough
   double departure = 150;                        ///< whether the camera departs from the rig's
   double no_starts = 15;                         ///< of one blob that has none
-  double starts = 330;                           ///< of one that has; beside others lines are split twice
-  double agreement = 12;                         ///< of one pose with the frame's colours
+  double starts = 330;       ///< of one that has, through the RCM; beside others lines are split twice
+  double free_starts = 500;  ///< the same without the RCM
+  double agreement = 12;     ///< of one pose with the frame's colours
   double blobs_per_px = 2.2e-4;
   double part_beside = 0.6;  ///< of the budget where every sample is tested for another instrument that hides it
   double cover = 1300;       ///< where one instrument lies, for who looks for another beside or behind it
-  double starts_in_blob(bool beside_others) const { return beside_others ? 2 * starts : starts; }
+  double starts_in_blob(bool through_rcm, bool beside_others) const {
+    return (beside_others ? 2 : 1) * (through_rcm ? starts : free_starts);
+  }
   double fine_fit() const { return 3 * fine_pass + fine_end; }
   double try_start() const { return coarse_fit + fine_fit(); }
   double fit_to_result() const { return 150 * agreement + fine_fit(); }

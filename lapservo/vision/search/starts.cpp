@@ -1,0 +1,442 @@
+#include "lapservo/vision/search/starts.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include <Eigen/Eigenvalues>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/core/statistics.h"
+#include "lapservo/geometry/rotation.h"
+#include "lapservo/marker/band_shares.h"
+#include "lapservo/vision/search/coarse_fit.h"
+#include "lapservo/vision/search/line_segmentation.h"
+
+namespace lapservo::internal {
+namespace {
+
+constexpr std::size_t line_count = 32, few_lines = 12, line_samples = 112, most_starts = 3;
+constexpr double nearer_scale = 0.8;  // blood along a side makes a shaft look thin, so far away
+
+// Rays of the camera by their angles: alpha about a pole, beta from it. The pole is the direction to a point that the
+// shaft's axis passes through on its proximal side, so the axis lies on one alpha, with beta growing towards its tip.
+class RaysFromPole {
+ public:
+  explicit RaysFromPole(const Eigen::Vector3d& pole) : pole_(pole) {
+    first_ = pole_.unitOrthogonal();
+    second_ = pole_.cross(first_);
+  }
+  double alpha_rad(const Eigen::Vector3d& ray) const { return std::atan2(ray.dot(second_), ray.dot(first_)); }
+  double beta_rad(const Eigen::Vector3d& ray) const {
+    return std::acos(std::clamp(ray.normalized().dot(pole_), -1.0, 1.0));
+  }
+  const Eigen::Vector3d& pole() const { return pole_; }
+  Eigen::Vector3d across(double alpha_rad) const {
+    return std::cos(alpha_rad) * first_ + std::sin(alpha_rad) * second_;
+  }
+  Eigen::Vector3d ray(double alpha_rad, double beta_rad) const {
+    return std::cos(beta_rad) * pole_ + std::sin(beta_rad) * across(alpha_rad);
+  }
+
+ private:
+  Eigen::Vector3d pole_, first_, second_;
+};
+
+// The part of the rays that a blob lies in.
+struct Fan {
+  double first_alpha_rad, step_alpha_rad, first_beta_rad, step_beta_rad;
+  double alpha_rad(double line) const { return first_alpha_rad + line * step_alpha_rad; }
+  double beta_rad(double sample) const { return first_beta_rad + sample * step_beta_rad; }
+};
+
+// By band, the cosines of its samples' betas.
+using BandCosines = std::array<std::vector<double>, 3>;
+
+// Whether the middle band and another one show, as the inner boundaries show psi, and no band lies wholly on the wrong
+// side of its neighbour, as in another marker's order. A blob of several markers may have all orders.
+bool may_be_in_order(BandCosines& bands) {
+  constexpr std::size_t min_samples = 2;
+  constexpr double quarter = 0.25;
+  const auto shows = [&](std::size_t band) { return bands[band].size() >= min_samples; };
+  const auto is_contradicted = [&](std::size_t band) {
+    return shows(band) && shows(band + 1) && quantile(bands[band], 1 - quarter) < quantile(bands[band + 1], quarter);
+  };
+  return shows(1) && (shows(0) || shows(2)) && !is_contradicted(0) && !is_contradicted(1);
+}
+
+// Over a blob's samples of the marker's colours, and as far beyond them as they are apart. Nullopt where they lie in
+// another order, or on all sides of the pole: the shaft points at the camera.
+std::optional<Fan> fan_over(const Scene& scene, const Blob& blob, const RaysFromPole& rays, std::size_t lines) {
+  constexpr double least_sine = 0.05;
+  std::optional<double> alpha_rad;  // of the first sample
+  Eigen::Vector3d ahead, aside;
+  double least_tangent = 1e9, most_tangent = -1e9, least_cosine = 1, most_cosine = -1;
+  BandCosines bands;
+  for (const Blob::Sample& sample : blob.samples) {
+    const auto band = std::find(scene.bands.begin(), scene.bands.end(), sample.colour);
+    if (band == scene.bands.end()) continue;
+    const auto ideal_px = scene.camera.ideal_from_raw(Eigen::Vector2d(sample.u, sample.v));
+    if (!ideal_px) continue;
+    const Eigen::Vector3d ray = scene.camera.ray_from_ideal(*ideal_px).normalized();
+    if (!alpha_rad) {
+      alpha_rad = rays.alpha_rad(ray);
+      ahead = rays.across(*alpha_rad), aside = rays.pole().cross(ahead);
+    }
+    if (!(ray.dot(ahead) > 0)) return std::nullopt;
+    const double tangent = ray.dot(aside) / ray.dot(ahead), cosine = ray.dot(rays.pole());
+    least_tangent = std::min(least_tangent, tangent), most_tangent = std::max(most_tangent, tangent);
+    least_cosine = std::min(least_cosine, cosine), most_cosine = std::max(most_cosine, cosine);
+    bands[static_cast<std::size_t>(band - scene.bands.begin())].push_back(cosine);
+  }
+  if (!may_be_in_order(bands)) return std::nullopt;
+  const double first_beta = std::acos(std::min(1.0, most_cosine)), last_beta = std::acos(std::max(-1.0, least_cosine));
+  const double alpha_margin_rad =
+      blob.grid_px / scene.camera.fx_px / std::max(least_sine, std::sin((first_beta + last_beta) / 2));
+  const double beta_margin_rad = 0.2 * (last_beta - first_beta) + 0.01;
+  const double first_alpha_rad = *alpha_rad + std::atan(least_tangent) - alpha_margin_rad;
+  const double last_alpha_rad = *alpha_rad + std::atan(most_tangent) + alpha_margin_rad;
+  const double from_rad = std::max(0.0, first_beta - beta_margin_rad);
+  const double to_rad = std::min(pi, last_beta + beta_margin_rad);
+  return Fan{first_alpha_rad, (last_alpha_rad - first_alpha_rad) / static_cast<double>(lines - 1), from_rad,
+             (to_rad - from_rad) / line_samples};
+}
+
+// A line's split into the bands, and how well it agrees [samples].
+struct Line {
+  LineSegmentation split;
+  double score = 0;
+  double length() const { return split.position[3] - split.position[0]; }
+};
+
+using Lines = std::vector<Line>;
+
+// Cosine and sine of each sample's beta: all lines have the same.
+using Samples = std::array<Eigen::Vector2d, line_samples>;
+
+Samples samples_of(const Fan& fan) {
+  Samples samples;
+  for (std::size_t k = 0; k < line_samples; ++k) {
+    const double beta_rad = fan.beta_rad(static_cast<double>(k) + 0.5);
+    samples[k] = {std::cos(beta_rad), std::sin(beta_rad)};
+  }
+  return samples;
+}
+
+std::uint8_t class_on_ray(const Scene& scene, const Eigen::Vector3d& ray) {
+  return scene.field.contains(ray) ? scene.class_beside(scene.camera.raw_from_point(ray)) : Scene::outside;
+}
+
+Line line_at(const Scene& scene, const RaysFromPole& rays, double alpha_rad, const Samples& samples) {
+  const Eigen::Vector3d across = rays.across(alpha_rad);
+  std::array<std::uint8_t, line_samples> classes;
+  for (std::size_t k = 0; k < line_samples; ++k) {
+    const Eigen::Vector3d ray = samples[k].x() * rays.pole() + samples[k].y() * across;
+    classes[k] = class_on_ray(scene, ray);
+  }
+  Line line{segment_line(classes, scene.bands)};
+  std::size_t state = 0;
+  for (std::size_t k = 0; k < line_samples; ++k) {
+    while (state < 4 && static_cast<double>(k) >= line.split.position[state]) ++state;
+    if (state >= 1 && state <= 3) line.score += line_reward(state, classes[k], scene.bands);
+  }
+  return line;
+}
+
+// Lines side by side that one shaft may show on.
+struct Window {
+  std::size_t middle = 0, first = 0, last = 0;  // lines
+  double score = 0;
+  bool has(std::size_t line) const { return line >= first && line <= last; }
+};
+
+// As wide as a marker is that looks as long as on the middle line.
+Window window_about(const Scene& scene, const Fan& fan, const Lines& lines, std::size_t middle) {
+  Window window{middle};
+  const Line& line = lines[middle];
+  const double length_rad = line.length() * fan.step_beta_rad;
+  const double beta_rad = fan.beta_rad((line.split.position[0] + line.split.position[3]) / 2);
+  const double half_rad = 0.8 * scene.marker.radius_m() / scene.marker.length_m() * length_rad;
+  const auto half = static_cast<std::size_t>(half_rad / std::max(0.05, std::sin(beta_rad)) / fan.step_alpha_rad);
+  window.first = middle - std::min(middle, half), window.last = std::min(middle + half, lines.size() - 1);
+  for (std::size_t i = window.first; i <= window.last; ++i) window.score += lines[i].score;
+  return window;
+}
+
+double most_score(const Lines& lines, const Window& window) {
+  double most = 0;
+  for (std::size_t i = window.first; i <= window.last; ++i) most = std::max(most, lines[i].score);
+  return most;
+}
+
+constexpr double least_share = 0.25;  // of the best line's score, for a line that shows the marker
+
+// A foreshortened marker is wider than by its length.
+Window grown(Window window, const Lines& lines) {
+  constexpr std::size_t most_apart = 3;
+  const double least = least_share * most_score(lines, window);
+  for (std::size_t i = window.first; i-- > 0 && window.first - i <= most_apart;)
+    if (lines[i].score >= least) window.first = i;
+  for (std::size_t i = window.last + 1; i < lines.size() && i - window.last <= most_apart; ++i)
+    if (lines[i].score >= least) window.last = i;
+  return window;
+}
+
+std::vector<Window> best_windows(const Scene& scene, const Fan& fan, const Lines& lines) {
+  constexpr double least = 0.3;  // of the best
+  std::vector<Window> all, best;
+  for (std::size_t i = 0; i < lines.size(); ++i)
+    if (lines[i].score > 0) all.push_back(window_about(scene, fan, lines, i));
+  std::sort(all.begin(), all.end(), [](const Window& a, const Window& b) { return a.score > b.score; });
+  for (const Window& window : all) {
+    if (best.size() == most_starts || window.score < least * all[0].score) break;
+    if (std::none_of(best.begin(), best.end(), [&](const Window& other) { return other.has(window.middle); }))
+      best.push_back(grown(window, lines));
+  }
+  return best;
+}
+
+// A window's view of the marker.
+struct Extent {
+  double alpha_rad, width_rad;
+  std::optional<double> first_beta_rad, last_beta_rad;
+  std::optional<double> only_side_rad;  // alpha of the side that shows where the other one is hidden, and in
+  double away_from_side = 0;            // which direction of alpha the axis lies
+  double sine_of_beta = 1;
+  bool other_bands = false;  // most lines show bands that the marker has at no azimuth
+};
+
+std::optional<BandShares> shares_of(const LineSegmentation& split) {
+  if (!std::all_of(split.seen.begin(), split.seen.end(), [](bool seen) { return seen; })) return std::nullopt;
+  BandShares shares{};
+  for (std::size_t i = 0; i < shares.size(); ++i)
+    shares[i] = (split.position[i + 1] - split.position[i]) / (split.position[3] - split.position[0]);
+  return shares;
+}
+
+// Whether nothing shows beside a line of the fan, by the image's border or another instrument, on most places from
+// first to last.
+bool is_hidden(const Scene& scene, const RaysFromPole& rays, double alpha_rad, double first_beta_rad,
+               double last_beta_rad) {
+  constexpr int places = 5;
+  int hidden = 0;
+  for (int i = 0; i < places; ++i) {
+    const Eigen::Vector3d ray =
+        rays.ray(alpha_rad, first_beta_rad + (last_beta_rad - first_beta_rad) * (i + 0.5) / places);
+    hidden += class_on_ray(scene, ray) == Scene::outside;
+  }
+  return 2 * hidden > places;
+}
+
+Extent extent_of(const Scene& scene, const RaysFromPole& rays, const Fan& fan, const Lines& lines,
+                 const Window& window) {
+  const double most = most_score(lines, window);
+  std::vector<double> first, last;
+  double sum = 0, lowest = static_cast<double>(lines.size()), highest = 0;
+  int count = 0, with_other_bands = 0;
+  for (std::size_t i = window.first; i <= window.last; ++i) {
+    if (lines[i].score < least_share * most) continue;
+    const auto place = static_cast<double>(i);
+    sum += place, ++count, lowest = std::min(lowest, place), highest = std::max(highest, place);
+    const auto shares = shares_of(lines[i].split);
+    with_other_bands += shares && !has_band_shares(scene.marker, *shares);
+    if (lines[i].split.seen[0]) first.push_back(fan.beta_rad(lines[i].split.position[0]));
+    if (lines[i].split.seen[3]) last.push_back(fan.beta_rad(lines[i].split.position[3]));
+  }
+  Extent extent{fan.alpha_rad(sum / count), 0, agreed_end(first), agreed_end(last)};
+  constexpr double most_of_them = 0.75;
+  extent.other_bands = with_other_bands > most_of_them * count;
+  const Line& middle = lines[window.middle];
+  const double from_rad = fan.beta_rad(middle.split.position[0]), to_rad = fan.beta_rad(middle.split.position[3]);
+  extent.sine_of_beta = std::sin((from_rad + to_rad) / 2);
+  extent.width_rad = (highest - lowest + 1) * fan.step_alpha_rad * extent.sine_of_beta;
+  const double low_rad = fan.alpha_rad(lowest - 1), high_rad = fan.alpha_rad(highest + 1);
+  const bool low_hidden = is_hidden(scene, rays, low_rad, from_rad, to_rad);
+  if (low_hidden == is_hidden(scene, rays, high_rad, from_rad, to_rad)) return extent;
+  extent.only_side_rad = low_hidden ? high_rad : low_rad, extent.away_from_side = low_hidden ? -1 : 1;
+  return extent;
+}
+
+// How far away the axis is, by the width that the marker shows.
+double distance_by_width_m(const Scene& scene, const Extent& extent) {
+  const double inset_rad = coarse_fit_limits.contour_inset_px / scene.camera.fx_px;
+  return scene.marker.radius_m() / std::sin(std::min(1.0, extent.width_rad / 2 + inset_rad));
+}
+
+// The alpha of the axis at a distance from the camera.
+double alpha_of_axis(const Scene& scene, const Extent& extent, double distance_m) {
+  if (!extent.only_side_rad) return extent.alpha_rad;
+  return *extent.only_side_rad +
+         extent.away_from_side * scene.marker.radius_m() / (distance_m * std::max(0.05, extent.sine_of_beta));
+}
+
+// How far away the proximal end of a shaft through the RCM is, by the length that the marker shows; by its width where
+// the length does not show it.
+double distance_of(const Scene& scene, const RaysFromPole& rays, const Extent& extent, double first_beta_rad,
+                   double rcm_m) {
+  constexpr int steps = 120;
+  constexpr double nearest_m = 0.03, farthest_m = 0.4, sigma_rad = 0.005, sigma_log = 0.3;
+  const double by_width_m = distance_by_width_m(scene, extent);
+  if (!extent.first_beta_rad || !extent.last_beta_rad) return by_width_m;
+  const Eigen::Vector3d rcm = rcm_m * rays.pole();
+  double least = 1e300, best_m = by_width_m;
+  for (int i = 0; i <= steps; ++i) {
+    const double distance_m = nearest_m * std::pow(farthest_m / nearest_m, 1.0 * i / steps);
+    const Eigen::Vector3d proximal = distance_m * rays.ray(extent.alpha_rad, first_beta_rad);
+    const Eigen::Vector3d distal = proximal + scene.marker.length_m() * (proximal - rcm).normalized();
+    const double cost = std::pow((rays.beta_rad(distal) - *extent.last_beta_rad) / sigma_rad, 2) +
+                        std::pow(std::log(distance_m / by_width_m) / sigma_log, 2);
+    if (cost < least) least = cost, best_m = distance_m;
+  }
+  return best_m;
+}
+
+std::optional<PoseUnknowns> start_through_rcm(const Scene& scene, const RaysFromPole& rays, const Extent& extent,
+                                              const Rigid3& camera_from_rcm) {
+  const double rcm_m = camera_from_rcm.translation.norm();
+  double first_beta_rad = extent.first_beta_rad.value_or(0);
+  if (!extent.first_beta_rad) {
+    // Seen squarely.
+    const double distance_m = distance_of(scene, rays, extent, 0, rcm_m);
+    first_beta_rad = *extent.last_beta_rad - scene.marker.length_m() / distance_m;
+  }
+  const double distance_m = distance_of(scene, rays, extent, first_beta_rad, rcm_m);
+  const double alpha_rad = alpha_of_axis(scene, extent, distance_m);
+  const auto q = configuration_through(camera_from_rcm, distance_m * rays.ray(alpha_rad, first_beta_rad));
+  return q ? std::optional(PoseUnknowns(pose_through_rcm(camera_from_rcm, *q), true)) : std::nullopt;
+}
+
+// At a distance of the axis, the foreshortening leaves two poses, tip towards or away from the camera, or one where
+// there is none.
+void add_free_starts(const Scene& scene, const RaysFromPole& rays, const Extent& extent, double distance_m,
+                     std::vector<PoseUnknowns>& starts) {
+  constexpr double least_tilt_rad = 0.05;
+  const double length_m = scene.marker.length_m(), alpha_rad = alpha_of_axis(scene, extent, distance_m);
+  const double shown_rad = length_m / distance_m;  // seen squarely
+  const double first_beta_rad = extent.first_beta_rad.value_or(*extent.last_beta_rad - shown_rad);
+  const double last_beta_rad = extent.last_beta_rad.value_or(first_beta_rad + shown_rad);
+  const double tilt_rad = std::acos(std::clamp((last_beta_rad - first_beta_rad) / shown_rad, 0.0, 1.0));
+  const Eigen::Vector3d sight = rays.ray(alpha_rad, (first_beta_rad + last_beta_rad) / 2);
+  const Eigen::Vector3d across_sight = (sight * sight.dot(rays.pole()) - rays.pole()).normalized();
+  for (const double sign : {1.0, -1.0}) {
+    const Eigen::Vector3d axis = std::cos(tilt_rad) * across_sight + sign * std::sin(tilt_rad) * sight;
+    const Eigen::Vector3d proximal =
+        (distance_m - sign * std::sin(tilt_rad) * length_m / 2) * rays.ray(alpha_rad, first_beta_rad);
+    starts.push_back(PoseUnknowns({{rotation_between(Eigen::Vector3d::UnitZ(), axis), proximal}, 0}, false));
+    if (tilt_rad < least_tilt_rad) break;
+  }
+}
+
+// A blob on the lines of a fan.
+struct SplitFan {
+  RaysFromPole rays;
+  Fan fan;
+  Lines lines;
+  std::vector<Window> windows;  // best first
+};
+
+std::optional<SplitFan> split_fan(const Scene& scene, const Blob& blob, const Eigen::Vector3d& pole,
+                                  std::size_t lines = line_count) {
+  const RaysFromPole rays(pole);
+  const auto fan = fan_over(scene, blob, rays, lines);
+  if (!fan) return std::nullopt;
+  SplitFan split{rays, *fan, {}, {}};
+  const Samples samples = samples_of(*fan);
+  for (std::size_t i = 0; i < lines; ++i)
+    split.lines.push_back(line_at(scene, rays, fan->alpha_rad(static_cast<double>(i)), samples));
+  split.windows = best_windows(scene, *fan, split.lines);
+  return split;
+}
+
+// The pole of lines along the shaft by a fan of lines that are nearly: a marker's ends are square to its axis.
+Eigen::Vector3d turned_pole(const SplitFan& split) {
+  constexpr std::size_t least_apart = 2;
+  const Window& window = split.windows.front();
+  std::vector<double> slopes;
+  for (const std::size_t end : {0, 3})
+    for (std::size_t i = window.first; i <= window.last; ++i)
+      for (std::size_t j = i + least_apart; j <= window.last; ++j) {
+        const LineSegmentation &a = split.lines[i].split, &b = split.lines[j].split;
+        if (a.seen[end] && b.seen[end])
+          slopes.push_back((b.position[end] - a.position[end]) / static_cast<double>(j - i));
+      }
+  const Eigen::Vector3d& pole = split.rays.pole();
+  if (slopes.empty()) return pole;
+  const double turn_rad = std::atan(median(slopes) * split.fan.step_beta_rad / split.fan.step_alpha_rad);
+  const Eigen::Vector3d aside = split.rays.across(split.fan.alpha_rad(static_cast<double>(window.middle)) + pi / 2);
+  return std::cos(turn_rad) * pole + std::sin(turn_rad) * aside;
+}
+
+// Where a blob spreads most, across the line of sight; nullopt where it shows nothing of the marker's colours.
+std::optional<Eigen::Vector3d> long_direction(const Scene& scene, const Blob& blob) {
+  std::vector<Eigen::Vector3d> rays;
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const Blob::Sample& sample : blob.samples) {
+    const auto ideal_px = scene.camera.ideal_from_raw(Eigen::Vector2d(sample.u, sample.v));
+    if (!scene.is_ours(sample.colour) || !ideal_px) continue;
+    rays.push_back(scene.camera.ray_from_ideal(*ideal_px).normalized());
+    sum += rays.back();
+  }
+  if (rays.empty()) return std::nullopt;
+  const Eigen::Vector3d middle = sum / static_cast<double>(rays.size());
+  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
+  for (const Eigen::Vector3d& ray : rays) scatter += (ray - middle) * (ray - middle).transpose();
+  const Eigen::Vector3d direction =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>().computeDirect(scatter).eigenvectors().col(2);
+  return (direction - direction.dot(middle) / middle.squaredNorm() * middle).normalized();
+}
+
+void add_starts(const Scene& scene, const SplitFan& split, const std::optional<Rigid3>& camera_from_rcm, Starts& starts,
+                std::vector<PoseUnknowns>& nearer) {
+  for (const Window& window : split.windows) {
+    const Extent extent = extent_of(scene, split.rays, split.fan, split.lines, window);
+    if (!extent.first_beta_rad && !extent.last_beta_rad) continue;
+    starts.other_bands |= extent.other_bands;
+    if (!camera_from_rcm) {
+      const double distance_m = distance_by_width_m(scene, extent);
+      add_free_starts(scene, split.rays, extent, distance_m, starts.poses);
+      add_free_starts(scene, split.rays, extent, nearer_scale * distance_m, nearer);
+    } else if (auto start = start_through_rcm(scene, split.rays, extent, *camera_from_rcm)) {
+      starts.poses.push_back(std::move(*start));
+    }
+  }
+}
+
+void add_starts(const Scene& scene, const Blob& blob, const std::optional<Rigid3>& camera_from_rcm, Starts& starts,
+                std::vector<PoseUnknowns>& nearer) {
+  if (camera_from_rcm) {
+    if (!(camera_from_rcm->translation.norm() > 1e-3)) return;
+    if (const auto split = split_fan(scene, blob, camera_from_rcm->translation.normalized()))
+      add_starts(scene, *split, camera_from_rcm, starts, nearer);
+    return;
+  }
+  const auto direction = long_direction(scene, blob);
+  if (!direction) return;
+  for (const Eigen::Vector3d& pole : {*direction, Eigen::Vector3d(-*direction)}) {
+    auto split = split_fan(scene, blob, pole, few_lines);
+    if (split && !split->windows.empty()) split = split_fan(scene, blob, turned_pole(*split));
+    if (split) add_starts(scene, *split, camera_from_rcm, starts, nearer);
+  }
+}
+
+}  // namespace
+
+Starts starts_in(const Scene& scene, const Blob& blob, const std::optional<Rigid3>& camera_from_rcm) {
+  Starts starts;
+  std::vector<PoseUnknowns> nearer;
+  add_starts(scene, blob, camera_from_rcm, starts, nearer);
+  if (!scene.others.empty()) {
+    Scene alone = scene;
+    alone.others = {};
+    add_starts(alone, blob, camera_from_rcm, starts, nearer);
+  }
+  if (!camera_from_rcm) starts.rivals = starts.poses.size();
+  starts.poses.insert(starts.poses.end(), nearer.begin(), nearer.end());
+  return starts;
+}
+
+}  // namespace lapservo::internal
