@@ -15,6 +15,9 @@
 
 #include "lapservo/core/random.h"
 #include "lapservo/geometry/rotation.h"
+#include "lapservo/sim/instrument_shaft.h"
+#include "lapservo/sim/renderer.h"
+#include "lapservo/sim/tissue.h"
 #include "lapservo/testing/scenes.h"
 #include "lapservo/vision/tracker.h"
 
@@ -156,6 +159,41 @@ TEST(Tip, OfAWristIsOffAsItsCovarianceSays) {
   EXPECT_GE(sigmas.minCoeff(), 0.7);
   EXPECT_LE(sigmas.maxCoeff(), 1.4);
   EXPECT_GT(readings, std::max(shaft, place)) << "the wrist is the largest part";
+}
+
+// The same frames with the tool in them and without.
+TEST(Tip, AToolInTheImageDoesNotDisturbTheMarker) {
+  const Wrist wrist;
+  double with_squared = 0, without_squared = 0;
+  int with_count = 0, without_count = 0;
+  for (std::uint64_t seed = 301; seed <= 400; ++seed) {
+    Random random(seed);
+    const Rig rig = scenes::usual_rig();
+    const Instrument& instrument = rig.instruments[0];
+    const JointVector q = scenes::random_configuration(rig, 0, random);
+    ShaftPlacement placement = placement_of(instrument, q, {random.uniform(-1, 1), random.uniform(-1, 1)});
+    Tool tool = wrist.tool();
+    tool.place.emplace().base_in_marker_m.z() = instrument.marker.length_m() + random.uniform(0.005, 0.02);
+    tool.place->azimuth_rad = random.uniform(-3, 3);
+    Instrument with = instrument;
+    with.tool = tool;
+    const cv::Mat tissue = make_tissue(rig.camera.width_px, rig.camera.height_px, seed);
+    const auto add = [&](const ShaftModel& shaft, double& squared, int& count) {
+      const cv::Mat image = Renderer(rig.camera, {shaft}, tissue).render({placement}, seed);
+      const Observation seen = Tracker(rig).track(image)[0];
+      if (seen.status != Status::ok || !seen.rcm) return;
+      const double off_rad = std::remainder(seen.rcm->q.psi_rad - q.psi_rad, 2 * std::numbers::pi);
+      squared += off_rad * off_rad, ++count;
+    };
+    add(shaft_of(with), with_squared, with_count);
+    add(shaft_of(instrument), without_squared, without_count);
+  }
+  const double with_rad = std::sqrt(with_squared / with_count),
+               without_rad = std::sqrt(without_squared / without_count);
+  std::printf("psi with a tool: %d frames, %.2f mrad rms; without: %d, %.2f mrad\n", with_count, 1e3 * with_rad,
+              without_count, 1e3 * without_rad);
+  EXPECT_GE(with_count, without_count - 1);
+  EXPECT_LE(with_rad, 1.1 * without_rad);
 }
 
 }  // namespace

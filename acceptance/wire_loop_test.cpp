@@ -377,6 +377,30 @@ TEST_P(WireLoop, TwoProcessesConverge) {
   expect_steady();
 }
 
+// By half a radian within two seconds.
+TEST_P(FirstWireLoop, TheTipStaysWhileTheWristMovesByItself) {
+  Tool& tool = rig_.instruments[0].tool.emplace();
+  tool.wrist = {{.name = "wrist_pitch", .alpha_rad = -1.57, .theta_rad = -1.57},
+                {.name = "wrist_yaw", .alpha_rad = -1.57, .a_m = 0.009, .theta_rad = -1.57}};
+  tool.last_from_tip.translation = {0, 0.01, 0};
+  tool.place.emplace().base_in_marker_m = {0, 0, 0.04};
+  testing::write_file(folder_ / "rig.yaml", rig_yaml(rig_));
+  const Rigid3 camera_from_marker = lapservo::camera_from_marker(
+      rig_.instruments[0].marker, *rig_.instruments[0].camera_from_rcm, {0.05, 1.57, 0.064, 1.2});
+  const Eigen::Vector3d goal_m =
+      camera_from_marker * tip_in_marker(tool, std::array{0.1, -0.2}).marker_from_tip.translation;
+  std::string csv = "time_s,x_m,y_m,z_m\n";
+  for (int k = 0; k < 20; ++k) csv += fmt::format("{},{},{},{}\n", k, goal_m.x() + 0.002, goal_m.y(), goal_m.z());
+  testing::write_file(folder_ / "v-d.csv", csv);
+  const Process room(sim_robot() + " --arm PSM1 --swing-wrist 0.5", file("arm.txt"));
+  const auto loop = servo(10);
+  EXPECT_EQ(loop->wait(), 0) << said() << said("arm.txt");
+  const std::string text = said(), before = "; the seen tip ";
+  const std::size_t at = text.find(before);
+  ASSERT_NE(at, std::string::npos) << text;
+  EXPECT_LE(std::stod(text.substr(at + before.size())), 0.5) << text;
+}
+
 TEST_P(WireLoop, TrackPublishesFrames) {
   const auto room = arm();
   listen();

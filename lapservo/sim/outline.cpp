@@ -42,22 +42,33 @@ Disc disc_around_ball(const Camera& camera, double half_field_rad, const Eigen::
   return {raw, radius_m * per_m * stretch * stretch};
 }
 
-std::vector<Span> outline(const Camera& camera, double half_field_rad, const ShaftModel& model,
-                          const ShaftPlacement& placement, double margin_px) {
-  std::vector<Span> bands(static_cast<std::size_t>((camera.height_px + band_rows - 1) / band_rows));
-  const double radius_m = model.tip_radius_m();
-  const double end_m = model.marker.length_m() + model.shaft_beyond_m;
-  for (double along_m = -model.shaft_before_m; along_m <= end_m;) {
-    const Eigen::Vector3d point = placement.camera_from_unrolled * Eigen::Vector3d(0, 0, along_m);
+void widen_along(std::vector<Span>& bands, const Camera& camera, double half_field_rad, const Eigen::Vector3d& from_m,
+                 const Eigen::Vector3d& to_m, double radius_m, double margin_px) {
+  const double length_m = (to_m - from_m).norm();
+  for (double along_m = 0;;) {
+    const Eigen::Vector3d point = length_m > 0 ? from_m + along_m / length_m * (to_m - from_m) : from_m;
     Disc disc = disc_around_ball(camera, half_field_rad, point, radius_m);
     if (disc.radius_px > 0) {
       disc.radius_px += margin_px + 1;
       widen(bands, disc, camera.width_px);
     }
-    const double next_m = along_m + std::max(1e-4, step_px * std::max(point.z(), 0.01) / camera.fx_px);
-    if (along_m == end_m) break;
-    along_m = std::min(next_m, end_m);
+    if (!(along_m < length_m)) break;
+    along_m = std::min(along_m + std::max(1e-4, step_px * std::max(point.z(), 0.01) / camera.fx_px), length_m);
   }
+}
+
+std::vector<Span> no_bands(const Camera& camera) {
+  return std::vector<Span>(static_cast<std::size_t>((camera.height_px + band_rows - 1) / band_rows));
+}
+
+std::vector<Span> outline(const Camera& camera, double half_field_rad, const ShaftModel& model,
+                          const ShaftPlacement& placement, double margin_px) {
+  std::vector<Span> bands = no_bands(camera);
+  const auto on_axis = [&](double along_m) -> Eigen::Vector3d {
+    return placement.camera_from_unrolled * Eigen::Vector3d(0, 0, along_m);
+  };
+  widen_along(bands, camera, half_field_rad, on_axis(-model.shaft_before_m),
+              on_axis(model.marker.length_m() + model.shaft_beyond_m), model.tip_radius_m(), margin_px);
   return bands;
 }
 

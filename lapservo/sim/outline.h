@@ -21,6 +21,13 @@ inline constexpr int band_rows = 16;
 std::vector<Span> outline(const Camera& camera, double half_field_rad, const ShaftModel& model,
                           const ShaftPlacement& placement, double margin_px);
 
+/// Widens them by what lies within a radius of the line between two points of the camera's frame.
+void widen_along(std::vector<Span>& bands, const Camera& camera, double half_field_rad, const Eigen::Vector3d& from_m,
+                 const Eigen::Vector3d& to_m, double radius_m, double margin_px);
+
+/// None of an image with so many rows.
+std::vector<Span> no_bands(const Camera& camera);
+
 /// A ball's image lies within this circle; radius 0 when it isn't in the field of view.
 struct Disc {
   Eigen::Vector2d centre_px = Eigen::Vector2d::Zero();

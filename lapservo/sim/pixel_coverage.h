@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 
 namespace lapservo::internal {
 
@@ -35,6 +36,23 @@ inline PixelCoverage negative_part(const std::array<float, 4>& f) {
   }
   if (!(twice_area > 1e-6F)) return {0, 0.5F, 0.5F};
   return {0.5F * twice_area, x / (3 * twice_area), y / (3 * twice_area)};
+}
+
+/// Places within a pixel, a rank-1 lattice: each has a row and a column of its own, so edges along the axes are as fine
+/// as any.
+constexpr std::array<std::array<float, 2>, 32> make_sample_lattice() {
+  std::array<std::array<float, 2>, 32> lattice{};
+  for (std::size_t i = 0; i < lattice.size(); ++i)
+    lattice[i] = {(static_cast<float>(i) + 0.5F) / lattice.size(),
+                  (static_cast<float>((i * 19 + 7) % lattice.size()) + 0.5F) / lattice.size()};
+  return lattice;
+}
+inline constexpr auto sample_lattice = make_sample_lattice();
+
+/// Between a function's values at the corners (0,0), (1,0), (1,1), (0,1).
+inline float within(const std::array<float, 4>& corner, float u, float v) {
+  const float top = corner[0] + u * (corner[1] - corner[0]), bottom = corner[3] + u * (corner[2] - corner[3]);
+  return top + v * (bottom - top);
 }
 
 }  // namespace lapservo::internal

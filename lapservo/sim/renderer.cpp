@@ -9,6 +9,7 @@
 #include "lapservo/sim/outline.h"
 #include "lapservo/sim/sensor.h"
 #include "lapservo/sim/shaft_painter.h"
+#include "lapservo/sim/tool_painter.h"
 
 namespace lapservo {
 using namespace internal;
@@ -73,7 +74,9 @@ Renderer::State::State(const Camera& camera, std::vector<ShaftModel> shafts, con
   CV_Assert(background.type() == CV_32FC3 && background.cols == camera.width_px && background.rows == camera.height_px);
   background_light_ = background.clone();
   scene_.light = background.clone();
-  if (shafts_.size() > 1) {
+  const bool has_tools =
+      std::any_of(shafts_.begin(), shafts_.end(), [](const ShaftModel& shaft) { return shaft.tool.has_value(); });
+  if (shafts_.size() > 1 || has_tools) {
     scene_.depth_m = cv::Mat(background.size(), CV_32F, cv::Scalar(far_m));
     scene_.cover = cv::Mat(background.size(), CV_32F, cv::Scalar(0));
   }
@@ -109,13 +112,8 @@ void Renderer::State::develop(const cv::Mat& light, const cv::Rect& part, Sensor
 
 std::vector<cv::Rect> Renderer::State::draw(const std::vector<ShaftPlacement>& placements) {
   std::vector<cv::Rect> drawn;
-  for (std::size_t i = 0; i < placements.size(); ++i) {
-    const ShaftModel& shaft = shafts_.at(i);
-    const Eigen::Vector3d tip =
-        placements[i].camera_from_unrolled * Eigen::Vector3d(0, 0, shaft.marker.length_m() + shaft.shaft_beyond_m);
-    ShaftPainter painter(shaft, placements[i], options_.lighting,
-                         disc_around_ball(camera_, half_field_rad_, tip, shaft.tip_radius_m()));
-    const auto bands = outline(camera_, half_field_rad_, shaft, placements[i], optics_.reach_px() + 1);
+  const double margin_px = optics_.reach_px() + 1;
+  const auto paint = [&](const std::vector<Span>& bands, auto& painter) {
     for (std::size_t b = 0; b < bands.size(); ++b) {
       if (bands[b].empty()) continue;
       const int top = static_cast<int>(b) * band_rows;
@@ -124,6 +122,21 @@ std::vector<cv::Rect> Renderer::State::draw(const std::vector<ShaftPlacement>& p
       painter.paint(rays_, part, background_light_, scene_);
       drawn.push_back(part);
     }
+  };
+  for (std::size_t i = 0; i < placements.size(); ++i) {
+    const ShaftModel& shaft = shafts_.at(i);
+    const Eigen::Vector3d tip =
+        placements[i].camera_from_unrolled * Eigen::Vector3d(0, 0, shaft.marker.length_m() + shaft.shaft_beyond_m);
+    ShaftPainter painter(shaft, placements[i], options_.lighting,
+                         disc_around_ball(camera_, half_field_rad_, tip, shaft.tip_radius_m()));
+    paint(outline(camera_, half_field_rad_, shaft, placements[i], margin_px), painter);
+    const std::vector<Capsule> links = tool_links(shaft, placements[i]);
+    if (links.empty()) continue;
+    std::vector<Span> bands = no_bands(camera_);
+    for (const Capsule& link : links)
+      widen_along(bands, camera_, half_field_rad_, link.from_m, link.to_m, link.radius_m, margin_px);
+    ToolPainter tool(links, options_.lighting);
+    paint(bands, tool);
   }
   return without_overlap(std::move(drawn));
 }

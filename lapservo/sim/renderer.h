@@ -20,10 +20,10 @@ struct RenderOptions {
 /// The scene of one exposure: the shafts at one or, for motion blur, several moments of it.
 using Exposure = std::vector<std::vector<ShaftPlacement>>;
 
-/// Renders shafts with markers in front of a background, from physical geometry: rays against cylinders, area-sampled
-/// at every edge, shaded and blurred in linear light, then the sensor. Never through the vision code or the
-/// cross-ratio. Positions of edges are right to 0.01 px.
-/// The background is blurred and encoded once; a frame costs its shafts and the noise.
+/// Renders shafts with markers, and their tools, in front of a background, from physical geometry: rays against
+/// cylinders, area-sampled at every edge, shaded and blurred in linear light, then the sensor. Never through the vision
+/// code or the cross-ratio. Positions of edges are right to 0.01 px. The background is blurred and encoded once; a
+/// frame costs its shafts and the noise.
 class Renderer {
  public:
   /// `background`: linear light, CV_32FC3, of the camera's size.

@@ -1,5 +1,6 @@
 #include "lapservo/sim/renderer.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <utility>
@@ -10,6 +11,7 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/core/random.h"
 #include "lapservo/kinematics/centre_line.h"
+#include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/sim/shaft_lighting.h"
 #include "lapservo/sim/shaft_tracer.h"
 #include "lapservo/sim/test_edge_probe.h"
@@ -228,6 +230,84 @@ TEST(Renderer, TheNearerShaftHidesTheFarther) {
   EXPECT_LE(max_difference(a(middle), only_near(middle)), 1);
   EXPECT_LE(max_difference(b(middle), only_near(middle)), 1);
   EXPECT_GT(max_difference(a, only_near), 50);
+}
+
+// dVRK's needle driver behind the shaft's end.
+ShaftModel shaft_with_tool() {
+  ShaftModel model = short_shaft();
+  Tool& tool = model.tool.emplace();
+  tool.wrist = {{.name = "wrist_pitch", .alpha_rad = -pi / 2, .theta_rad = -pi / 2},
+                {.name = "wrist_yaw", .alpha_rad = -pi / 2, .a_m = 0.0091, .theta_rad = -pi / 2}};
+  tool.last_from_tip.translation = {0, 0.0102, 0};
+  Tool::Place& place = tool.place.emplace();
+  place.base_in_marker_m = {0, 0, model.marker.length_m() + model.shaft_beyond_m};
+  place.azimuth_rad = 0.4;
+  return model;
+}
+
+TEST(Renderer, AToolEndsWhereItsKinematicsSay) {
+  const Camera camera = small_camera();
+  const ShaftModel with = shaft_with_tool();
+  Renderer renderer(camera, {with}, even_background(camera, 0.9F), quiet()),
+      bare(camera, {short_shaft()}, even_background(camera, 0.9F), quiet());
+  Random random(17);
+  int shown = 0;
+  for (int trial = 0; trial < 60; ++trial) {
+    ShaftPlacement placement = across_the_view(random.uniform(-pi, pi), random.uniform(-pi, pi));
+    placement.wrist_rad = {random.uniform(-0.8, 0.8), random.uniform(-0.8, 0.8)};
+    const Rigid3 pose = camera_from_marker(with.marker, placement.camera_from_unrolled, placement.psi_rad);
+    const Rigid3 marker_from_tip = tip_in_marker(*with.tool, placement.wrist_rad).marker_from_tip;
+    const Eigen::Vector2d tip_px = camera.ideal_from_point(pose * marker_from_tip.translation);
+    if (!cv::Rect(5, 5, camera.width_px - 10, camera.height_px - 10)
+             .contains(cv::Point(static_cast<int>(tip_px.x()), static_cast<int>(tip_px.y()))))
+      continue;
+    const Rigid3 marker_from_jaw = marker_from_tip * with.tool->last_from_tip.inverse();
+    const Eigen::Vector2d jaw_px = tip_px - camera.ideal_from_point(pose * marker_from_jaw.translation);
+    if (jaw_px.norm() < 50) continue;  // its round end shows beyond it, or it lies behind the wrist
+    ++shown;
+    cv::Mat changed;
+    cv::absdiff(renderer.render({placement}, 1), bare.render({placement}, 1), changed);
+    double nearest_px = 1e9, beyond_px = -1e9;
+    for (int v = 0; v < changed.rows; ++v)
+      for (int u = 0; u < changed.cols; ++u) {
+        const cv::Vec3b& by = changed.at<cv::Vec3b>(v, u);
+        if (std::max({by[0], by[1], by[2]}) < 8) continue;
+        const Eigen::Vector2d off_px = Eigen::Vector2d(u, v) - tip_px;
+        nearest_px = std::min(nearest_px, off_px.norm());
+        beyond_px = std::max(beyond_px, off_px.dot(jaw_px.normalized()));
+      }
+    EXPECT_LT(nearest_px, 1.5) << trial;
+    EXPECT_NEAR(beyond_px, 1, 3) << trial;  // blurred
+  }
+  EXPECT_GT(shown, 20);
+}
+
+// A jaw that bends back over the marker.
+TEST(Renderer, AToolHidesTheMarkerOnlyWhereItIsInFrontOfIt) {
+  const Camera camera = small_camera();
+  Random random(18);
+  for (int trial = 0; trial < 10; ++trial) {
+    const ShaftPlacement placement = across_the_view(random.uniform(-pi, pi), random.uniform(-pi, pi));
+    ShaftModel shaft = short_shaft();
+    const Rigid3 pose = camera_from_marker(shaft.marker, placement.camera_from_unrolled, placement.psi_rad);
+    const Eigen::Vector3d camera_in_marker_m = pose.inverse().translation;
+    const Eigen::Vector3d towards(camera_in_marker_m.x(), camera_in_marker_m.y(), 0);
+    const cv::Mat bare = Renderer(camera, {shaft}, even_background(camera, 0.1F), quiet()).render({placement}, 1);
+    const auto over_marker = [&](double side) {
+      Tool& tool = shaft.tool.emplace();
+      tool.wrist = {{.name = "wrist"}};
+      tool.place.emplace().base_in_marker_m = {0, 0, shaft.marker.length_m() + shaft.shaft_beyond_m};
+      tool.last_from_tip.translation = side * 0.012 * towards.normalized() - Eigen::Vector3d(0, 0, 0.024);
+      const Eigen::Vector3d tip_m =
+          pose * (tool.place->base_in_marker_m + tool.last_from_tip.translation - side * 0.001 * towards.normalized());
+      const Eigen::Vector2d tip_px = camera.ideal_from_point(tip_m);
+      const cv::Rect around(static_cast<int>(tip_px.x()) - 2, static_cast<int>(tip_px.y()) - 2, 5, 5);
+      const cv::Mat image = Renderer(camera, {shaft}, even_background(camera, 0.1F), quiet()).render({placement}, 1);
+      return max_difference(image(around), bare(around));
+    };
+    EXPECT_GT(over_marker(1), 30) << trial;
+    EXPECT_EQ(over_marker(-1), 0) << trial;
+  }
 }
 
 // The lamps' light, diffuse and specular, is proportional to their power; ambient light stays.

@@ -2,12 +2,14 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
 
 #include "lapservo/geometry/rigid3.h"
 #include "lapservo/marker/marker.h"
+#include "lapservo/tool/tool.h"
 
 namespace lapservo {
 
@@ -46,7 +48,8 @@ struct ShaftModel {
   double shaft_before_m = 0.3;    ///< length of shaft shown on the proximal side
   double shaft_beyond_m = 0.012;  ///< and on the distal side, before the tip
   std::vector<Blotch> blotches;
-  PrintedCells cells{};  ///< none: the marker's bands
+  PrintedCells cells{};        ///< none: the marker's bands
+  std::optional<Tool> tool{};  ///< with its place: links, of a wrist with a closed jaw, from the shaft's end to the tip
 
   double tip_radius_m() const { return 1.05 * marker.radius_m(); }
 };
@@ -55,7 +58,8 @@ struct ShaftModel {
 struct ShaftPlacement {
   Rigid3 camera_from_unrolled;  ///< z along the axis, origin at the marker's proximal end
   double psi_rad = 0;
-  bool covered = false;  ///< something dark lies over the whole marker
+  bool covered = false;             ///< something dark lies over the whole marker
+  std::vector<double> wrist_rad{};  ///< readings of the tool's wrist; empty: all 0
 };
 
 /// The noise of the camera's sensor, in linear light with 1 at white.

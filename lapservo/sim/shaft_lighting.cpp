@@ -49,18 +49,19 @@ ShaftLighting::ShaftLighting(const Lighting& lighting, const ShaftTracer& tracer
   for (std::size_t i = 0; i < lamps_.size(); ++i) lamps_[i] = tracer.in_facing_frame(lighting.lamps_in_camera_m[i]);
 }
 
-Lit ShaftLighting::at(const Eigen::Vector3f& point, const Eigen::Vector3f& normal) const {
-  const auto reference_m = static_cast<float>(lighting_.reference_m);
-  const Eigen::Vector3f to_camera = (camera_ - point).normalized();
-  Lit lit{lighting_.ambient, 0};
-  for (const Eigen::Vector3f& lamp : lamps_) {
+Lit light_at(const Lighting& lighting, const std::array<Eigen::Vector3f, 2>& lamps, const Eigen::Vector3f& camera,
+             const Eigen::Vector3f& point, const Eigen::Vector3f& normal) {
+  const auto reference_m = static_cast<float>(lighting.reference_m);
+  const Eigen::Vector3f to_camera = (camera - point).normalized();
+  Lit lit{lighting.ambient, 0};
+  for (const Eigen::Vector3f& lamp : lamps) {
     const Eigen::Vector3f to_lamp = lamp - point;
     const float distance_m = to_lamp.norm(), facing = normal.dot(to_lamp) / distance_m;
     if (!(facing > 0)) continue;
     const float ratio = distance_m / reference_m, falloff = 1 / (1 + ratio * ratio);
-    lit.matt += lighting_.diffuse * falloff * facing;
+    lit.matt += lighting.diffuse * falloff * facing;
     const float half = normal.dot((to_lamp / distance_m + to_camera).normalized());
-    if (half > 0) lit.gloss += lighting_.specular * falloff * std::pow(half, lighting_.specular_exponent);
+    if (half > 0) lit.gloss += lighting.specular * falloff * std::pow(half, lighting.specular_exponent);
   }
   return lit;
 }

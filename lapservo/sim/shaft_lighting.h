@@ -14,6 +14,10 @@ struct Lit {
   float matt = 0, gloss = 0;
 };
 
+/// At a point, seen from `camera`, all in one frame; exact.
+Lit light_at(const Lighting& lighting, const std::array<Eigen::Vector3f, 2>& lamps, const Eigen::Vector3f& camera,
+             const Eigen::Vector3f& point, const Eigen::Vector3f& normal);
+
 /// Light on one shaft in one pose. Over a cylinder it changes slowly, so it is computed on a grid of azimuth and
 /// length, row by row on first use, and interpolated (to 0.2 % of white).
 class ShaftLighting {
@@ -23,7 +27,9 @@ class ShaftLighting {
   /// On the film or the shaft; azimuth from the facing generatrix.
   Lit on_side(float azimuth_rad, float along_m);
   /// At any point (facing frame); exact.
-  Lit at(const Eigen::Vector3f& point, const Eigen::Vector3f& normal) const;
+  Lit at(const Eigen::Vector3f& point, const Eigen::Vector3f& normal) const {
+    return light_at(lighting_, lamps_, camera_, point, normal);
+  }
 
  private:
   static constexpr std::size_t columns = 96;

@@ -9,27 +9,11 @@
 namespace lapservo::internal {
 namespace {
 
-constexpr std::size_t samples_a_pixel = 32;
 // Beyond these azimuths, curvature within a pixel counts: near the silhouettes.
 constexpr float flat_rad = 1.2F, contour_rad = 1.35F;
 
-// A rank-1 lattice: every sample has a row and a column of its own, so edges along the axes are as fine as any.
-constexpr std::array<std::array<float, 2>, samples_a_pixel> make_lattice() {
-  std::array<std::array<float, 2>, samples_a_pixel> lattice{};
-  for (std::size_t i = 0; i < samples_a_pixel; ++i)
-    lattice[i] = {(static_cast<float>(i) + 0.5F) / samples_a_pixel,
-                  (static_cast<float>((i * 19 + 7) % samples_a_pixel) + 0.5F) / samples_a_pixel};
-  return lattice;
-}
-constexpr auto lattice = make_lattice();
-
 float mean(const std::array<float, 4>& values) {
   return 0.25F * (values[0] + values[1] + values[2] + values[3]);
-}
-
-float within(const std::array<float, 4>& corner, float u, float v) {
-  const float top = corner[0] + u * (corner[1] - corner[0]), bottom = corner[3] + u * (corner[2] - corner[3]);
-  return top + v * (bottom - top);
 }
 
 // Bare plastic reflects less than the film.
@@ -70,6 +54,18 @@ void PixelRays::fill(RayRow& rays, int begin, int v) const {
   }
 }
 
+void blend(const Paint& paint, float depth_m, const cv::Vec3f& background, cv::Vec3f& pixel, float& nearest_m,
+           float& cover) {
+  const bool in_front = depth_m < nearest_m;
+  const float seen = in_front ? 1 : 1 - cover;
+  for (int c = 0; c < 3; ++c) {
+    const float hidden = in_front ? pixel[c] : background[c];
+    pixel[c] += seen * (paint.light[c] - paint.cover * hidden);
+  }
+  cover += (1 - cover) * paint.cover;
+  nearest_m = std::min(nearest_m, depth_m);
+}
+
 ShaftPainter::ShaftPainter(const ShaftModel& model, const ShaftPlacement& placement, const Lighting& lighting,
                            const Disc& tip)
     : tracer_(model, placement), lighting_(lighting, tracer_), reflectances_(reflectances(model.marker)), tip_(tip) {
@@ -80,7 +76,7 @@ ShaftPainter::ShaftPainter(const ShaftModel& model, const ShaftPlacement& placem
   if (placement.covered)
     for (const Part band : {Part::band_0, Part::band_1, Part::band_2})
       reflectances_.at(static_cast<std::size_t>(band)) = reflectances_.at(static_cast<std::size_t>(Part::blood));
-  samples_.resize(samples_a_pixel);
+  samples_.resize(sample_lattice.size());
   single_.resize(1);
 }
 
@@ -125,16 +121,8 @@ void ShaftPainter::paint(const PixelRays& rays, const cv::Rect& part, const cv::
       float depth_m = 1e9F;
       for (std::size_t k = 0; k < 4; ++k)
         if (at.part[k] != Part::nothing) depth_m = std::min(depth_m, at.depth_m[k]);
-      float& nearest_m = scene.depth_m.ptr<float>(v, part.x)[i];
-      float& cover = scene.cover.ptr<float>(v, part.x)[i];
-      const bool in_front = depth_m < nearest_m;
-      const float seen = in_front ? 1 : 1 - cover;
-      for (int c = 0; c < 3; ++c) {
-        const float hidden = in_front ? pixel[c] : background[i][c];
-        pixel[c] += seen * (paint.light[c] - paint.cover * hidden);
-      }
-      cover += (1 - cover) * paint.cover;
-      nearest_m = std::min(nearest_m, depth_m);
+      blend(paint, depth_m, background[i], pixel, scene.depth_m.ptr<float>(v, part.x)[i],
+            scene.cover.ptr<float>(v, part.x)[i]);
     }
   }
 }
@@ -148,7 +136,7 @@ bool ShaftPainter::spans_seam(const Corners& at) const {
   return false;
 }
 
-ShaftPainter::Paint ShaftPainter::paint_pixel(const Corners& at) {
+Paint ShaftPainter::paint_pixel(const Corners& at) {
   const Part low = *std::min_element(at.part.begin(), at.part.end());
   const Part high = *std::max_element(at.part.begin(), at.part.end());
   if (tracer_.has_gap() && is_band(high) && spans_seam(at)) return sampled(at);
@@ -160,7 +148,7 @@ ShaftPainter::Paint ShaftPainter::paint_pixel(const Corners& at) {
   return sampled(at);
 }
 
-ShaftPainter::Paint ShaftPainter::of_side(Part part, float azimuth_rad, float along_m) {
+Paint ShaftPainter::of_side(Part part, float azimuth_rad, float along_m) {
   const Lit lit = lighting_.on_side(azimuth_rad, along_m);
   return {reflectances_[static_cast<std::size_t>(part)] * lit.matt + Light::Constant(polish(part) * lit.gloss), 1};
 }
@@ -176,7 +164,7 @@ Lit ShaftPainter::lit_at(Part part, float x, float y, float depth_m) const {
   return lighting_.at(point, {0, 0, point.z() < 0.5F * tracer_.length_m() ? -1.0F : 1.0F});
 }
 
-ShaftPainter::Paint ShaftPainter::inside(const Corners& at) {
+Paint ShaftPainter::inside(const Corners& at) {
   if (at.part[0] == Part::tip) {
     const Lit lit = lit_at(Part::tip, mean(at.x), mean(at.y), mean(at.depth_m));
     return {reflectance(Part::tip, mean(at.along_m)) * lit.matt + Light::Constant(lit.gloss), 1};
@@ -226,18 +214,18 @@ bool ShaftPainter::boundary(const Corners& at, Part proximal, Part distal, Paint
   return true;
 }
 
-ShaftPainter::Paint ShaftPainter::sampled(const Corners& at) {
+Paint ShaftPainter::sampled(const Corners& at) {
   const bool with_tip = std::find(at.part.begin(), at.part.end(), Part::tip) != at.part.end();
-  for (std::size_t i = 0; i < samples_a_pixel; ++i) {
-    samples_.x[i] = within(at.x, lattice[i][0], lattice[i][1]);
-    samples_.y[i] = within(at.y, lattice[i][0], lattice[i][1]);
+  for (std::size_t i = 0; i < sample_lattice.size(); ++i) {
+    samples_.x[i] = within(at.x, sample_lattice[i][0], sample_lattice[i][1]);
+    samples_.y[i] = within(at.y, sample_lattice[i][0], sample_lattice[i][1]);
   }
   tracer_.trace(samples_, with_tip);
   // The light falls on each surface within the pixel nearly evenly: worked out once for each.
   std::optional<Lit> on_tip, on_edge;
   Light side = Light::Zero(), other = Light::Zero();
   float side_count = 0, side_polish = 0, count = 0, azimuth_rad = 0, along_m = 0;
-  for (std::size_t i = 0; i < samples_a_pixel; ++i) {
+  for (std::size_t i = 0; i < sample_lattice.size(); ++i) {
     const Part part = samples_.part[i];
     if (part == Part::nothing) continue;
     ++count;
@@ -259,8 +247,8 @@ ShaftPainter::Paint ShaftPainter::sampled(const Corners& at) {
     const Lit lit = lighting_.on_side(azimuth_rad / side_count, along_m / side_count);
     paint.light = side * lit.matt + Light::Constant(side_polish * lit.gloss);
   }
-  paint.light = (paint.light + other) / samples_a_pixel;
-  paint.cover = count / samples_a_pixel;
+  paint.light = (paint.light + other) / sample_lattice.size();
+  paint.cover = count / sample_lattice.size();
   return paint;
 }
 

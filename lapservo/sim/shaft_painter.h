@@ -25,11 +25,21 @@ class PixelRays {
   cv::Mat x_, y_;  // of a distorted camera, (height + 1) x (width + 1)
 };
 
-/// Light that gathers in front of a background. `depth_m` and `cover` say for each pixel how near the nearest shaft
-/// drawn so far is and what fraction of the pixel shafts cover; empty when there is only one.
+/// Light that gathers in front of a background. `depth_m` and `cover` say for each pixel how near the nearest thing
+/// drawn so far is and what fraction of the pixel is covered; empty when there is only one shaft.
 struct SceneLight {
   cv::Mat light, depth_m, cover;
 };
+
+/// The light that a pixel receives from one thing, weighted with the fraction of the pixel that it covers.
+struct Paint {
+  Light light = Light::Zero();
+  float cover = 0;
+};
+
+/// Puts it into a pixel of a SceneLight, in front of what is there or behind; `background`: the pixel without anything.
+void blend(const Paint& paint, float depth_m, const cv::Vec3f& background, cv::Vec3f& pixel, float& nearest_m,
+           float& cover);
 
 /// Paints one shaft in one pose.
 class ShaftPainter {
@@ -41,11 +51,6 @@ class ShaftPainter {
   void paint(const PixelRays& rays, const cv::Rect& part, const cv::Mat& behind, SceneLight& scene);
 
  private:
-  /// The light that a pixel receives from this shaft, weighted with the fraction of the pixel that it covers.
-  struct Paint {
-    Light light = Light::Zero();
-    float cover = 0;
-  };
   /// The four corners of a pixel: (0,0), (1,0), (1,1), (0,1).
   struct Corners {
     std::array<Part, 4> part;

@@ -8,11 +8,13 @@
 
 #include <fmt/format.h>
 
+#include "lapservo/core/angles.h"
 #include "lapservo/core/error.h"
 #include "lapservo/core/minimum_jerk.h"
 #include "lapservo/geometry/rotation.h"
 #include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/same_moment.h"
+#include "lapservo/sim/simulated_wrist.h"
 #include "lapservo/sim/tissue.h"
 
 namespace lapservo {
@@ -66,11 +68,24 @@ Simulator::Simulator(const Rig& rig, const SimulatorConfig& config, std::unique_
                        Rigid3{Eigen::Quaterniond::Identity(), config.arm.rcm_offset_m}),
       arm_(std::move(arm)),
       endoscope_(make_endoscope(rig, config)),
-      arm_period_s_(1 / config.arm_rate_hz) {}
+      arm_period_s_(1 / config.arm_rate_hz),
+      tool_(rig.instruments.front().tool.value_or(Tool())),
+      wrist_swing_rad_(config.wrist_swing_rad) {}
 
 JointState Simulator::state() {
-  return {time_s_, JointVector::from_vector(arm_->measured_jp()),
-          arm_->faulted() ? OperatingState::fault : OperatingState::enabled};
+  JointState state{time_s_, JointVector::from_vector(arm_->measured_jp()),
+                   arm_->faulted() ? OperatingState::fault : OperatingState::enabled};
+  state.wrist_rad = wrist_rad();
+  return state;
+}
+
+std::vector<double> Simulator::wrist_rad() const {
+  return simulated_wrist_rad(tool_, wrist_swung_rad());
+}
+
+double Simulator::wrist_swung_rad() const {
+  constexpr double swing_s = 4;
+  return wrist_swing_rad_ * (1 - std::cos(two_pi * time_s_ / swing_s)) / 2;
 }
 
 void Simulator::send(const JointPath& path) {
@@ -97,7 +112,7 @@ ShaftPlacement Simulator::placement() const {
   const JointVector q = true_q();
   const bool covered =
       std::any_of(covered_.begin(), covered_.end(), [&](const Interval& when) { return when.contains(time_s_); });
-  return {camera_from_first_camera() * camera_from_rcm_ * rcm_from_unrolled(q), q.psi_rad, covered};
+  return {camera_from_first_camera() * camera_from_rcm_ * rcm_from_unrolled(q), q.psi_rad, covered, wrist_rad()};
 }
 
 Rigid3 Simulator::camera_from_first_camera() const {

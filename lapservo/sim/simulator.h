@@ -27,6 +27,7 @@ struct SimulatorConfig {
   RenderOptions render;
   std::vector<Blotch> blotches;  ///< of blood, on the marker
   double arm_rate_hz = 1000;     ///< at which the arm samples a path
+  double wrist_swing_rad = 0;    ///< of the first joint of the tool's wrist by somebody else, there and back within 4 s
   std::uint64_t seed = 1;        ///< of tissue, noise, jitter and lost frames
 };
 
@@ -101,6 +102,10 @@ class Simulator : public Robot, public ImageStream, public Clock {
   /// The present place of a point that was given in the camera's frame at the beginning.
   Rigid3 camera_from_first_camera() const;
 
+  /// Readings of the joints of the tool's wrist now; none without a wrist.
+  std::vector<double> wrist_rad() const;
+  /// By how much its first joint has swung.
+  double wrist_swung_rad() const;
   /// The instrument in the camera's truth, now.
   JointVector true_q() const { return JointVector::from_vector(arm_->true_jp()); }
   ShaftPlacement placement() const;
@@ -112,6 +117,8 @@ class Simulator : public Robot, public ImageStream, public Clock {
   std::unique_ptr<SimulatedArm> arm_;
   Endoscope endoscope_;
   double arm_period_s_;
+  Tool tool_;
+  double wrist_swing_rad_;
   std::optional<JointPath> path_;
   ReadingBuffer readings_;
   std::vector<Interval> covered_;

@@ -214,5 +214,30 @@ TEST(Simulator, RefusesNonsense) {
   EXPECT_THROW(Simulator(rig, {}, {0, 1.5, 0.1, 0}), InputError);
 }
 
+// Shown and read as it is.
+TEST(Simulator, TheFirstJointOfAWristSwings) {
+  Rig rig = small_rig();
+  Tool& tool = rig.instruments[0].tool.emplace();
+  tool.wrist.resize(4);
+  SimulatorConfig config = without_pictures(without_offsets());
+  config.wrist_swing_rad = 0.5;
+  const auto wrist_at = [&](double time_s) {
+    Simulator simulator(rig, config, in_view(rig));
+    simulator.step(time_s);
+    EXPECT_EQ(simulator.placement().wrist_rad, simulator.state().wrist_rad);
+    return simulator.state().wrist_rad;
+  };
+  const std::vector<double> first = wrist_at(0), half_way = wrist_at(2);
+  EXPECT_NEAR(half_way[0] - first[0], 0.5, 1e-9);
+  EXPECT_NEAR(wrist_at(4)[0], first[0], 1e-9);
+  EXPECT_EQ(half_way[3], first[3]);
+  tool.snake_like = true;
+  const std::vector<double> snake = wrist_at(2);
+  EXPECT_EQ(snake[3], snake[0]);
+  EXPECT_EQ(snake[2], snake[1]);
+  rig.instruments[0].tool.reset();
+  EXPECT_TRUE(wrist_at(0).empty());
+}
+
 }  // namespace
 }  // namespace lapservo::internal

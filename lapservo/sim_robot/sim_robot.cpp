@@ -10,17 +10,24 @@
 #include "lapservo/crtk/image_decoder.h"
 #include "lapservo/crtk/joint_map.h"
 #include "lapservo/io/pictures/jpeg_encoding.h"
+#include "lapservo/sim/simulated_wrist.h"
+#include "lapservo/tool/wrist.h"
 
 namespace lapservo::internal {
 namespace {
 
 constexpr const char* compressed_topic = "image_raw/compressed";
-constexpr std::array wrist{0.1, -0.2};  // where its joints stay, or swing from
-constexpr double swing_s = 4, wrist_behind_rad = 0.02;
+constexpr double wrist_behind_rad = 0.02;
 
-std::vector<std::string> names_with_wrist(const Joints& joints) {
-  std::vector<std::string> names(joints.names.begin(), joints.names.end());
-  names.insert(names.end(), {"outer_wrist_pitch", "outer_wrist_yaw"});
+Tool tool_of(const Rig& rig) {
+  Tool tool = rig.instruments.front().tool.value_or(Tool());
+  if (tool.wrist.empty()) tool.wrist = {{.name = "outer_wrist_pitch"}, {.name = "outer_wrist_yaw"}};
+  return tool;
+}
+
+std::vector<std::string> joined(const std::array<std::string, 4>& shaft, const std::vector<std::string>& wrist) {
+  std::vector<std::string> names(shaft.begin(), shaft.end());
+  names.insert(names.end(), wrist.begin(), wrist.end());
   return names;
 }
 
@@ -48,8 +55,9 @@ SimRobot::SimRobot(Transport& transport, const Rig& rig, Simulator& simulator, c
       simulator_(simulator),
       config_(config),
       joints_(rig.instruments.front().joints.value_or(default_joints())),
-      arm_(transport, config.arm, names_with_wrist(joints_)),
-      wrist_rad_(wrist.begin(), wrist.end()),
+      tool_(tool_of(rig)),
+      arm_(transport, config.arm, joined(joints_.names, wrist_names(tool_))),
+      wrist_rad_(simulated_wrist_rad(tool_, simulator.wrist_swung_rad())),
       setpoint_(simulator.measured_jp()),
       last_wanted_(setpoint_),
       image_(transport.image_publisher(topic_of(config.camera, "image_raw"))),
@@ -101,13 +109,13 @@ ServoStatistics SimRobot::statistics() const {
 
 void SimRobot::advance(double time_s) {
   stamp_at_0_s_ = transport_.stamp_now_s() - time_s;
-  wrist_rad_[0] = wrist[0] + config_.wrist_swing_rad * (1 - std::cos(2 * std::numbers::pi * time_s / swing_s)) / 2;
   for (const std::string& command : arm_.new_commands()) obey(command);
   if (const auto positions = arm_.new_setpoint()) obey(*positions);
   // An arm that is not enabled wants to be where it is.
   if (operating_state() != OperatingState::enabled) last_wanted_ = setpoint_ = simulator_.measured_jp();
   simulator_.servo_jp(setpoint_);
   simulator_.step(std::max(0.0, time_s - simulator_.now_s()));
+  wrist_rad_ = simulated_wrist_rad(tool_, simulator_.wrist_swung_rad());
   if (time_s >= next_joints_s_) {
     next_joints_s_ = std::max(next_joints_s_ + 1 / config_.joint_rate_hz, time_s);
     say_joints();

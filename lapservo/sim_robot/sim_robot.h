@@ -24,7 +24,6 @@ struct SimRobotConfig {
   std::string arm = "PSM1";           ///< namespace of the CRTK topics
   std::string camera = "/endoscope";  ///< namespace of image_raw and camera_info
   double joint_rate_hz = 250;         ///< of measured_js and setpoint_js
-  double wrist_swing_rad = 0;         ///< of its first joint by somebody else, there and back within 4 s
   /// For tests of who steers it: changes what it says.
   std::function<void(JointMessage&)> alter_measured{};
   std::function<void(ImageMessage&)> alter_image{};
@@ -40,7 +39,8 @@ struct ServoStatistics {
 
 /// The simulator behind the topics of a CRTK PSM and its camera: measured_js, setpoint_js, operating_state out,
 /// servo_jp and state_command (enable, disable, pause, resume, home, unhome) in; image_raw, image_raw/compressed where
-/// somebody reads it, camera_info out. It has two wrist joints more than the rig names. Starts ENABLED and homed.
+/// somebody reads it, camera_info out. Its wrist has the joints of the rig's tool, or two by dVRK's names where the
+/// tool has none. Starts ENABLED and homed.
 class SimRobot {
  public:
   /// The rig's first instrument; its `joints`, or default_joints(). The arguments must outlive it.
@@ -68,6 +68,7 @@ class SimRobot {
   Simulator& simulator_;
   SimRobotConfig config_;
   Joints joints_;
+  Tool tool_;
   CrtkArm arm_;
   std::vector<double> wrist_rad_;
   Eigen::Vector4d setpoint_, last_wanted_;

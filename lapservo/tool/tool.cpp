@@ -72,26 +72,30 @@ void internal::expect_wrist(const Tool& tool, std::span<const double> wrist_rad)
       throw InputError("tool", tool.wrist[i].name, fmt::format("{}", wrist_rad[i]), "a finite angle in radians");
 }
 
-TipInMarker tip_in_marker(const Tool& tool, std::span<const double> wrist_rad) {
+std::array<Rigid3, 1 + Tool::max_wrist_joints> internal::joints_in_marker(const Tool& tool,
+                                                                          std::span<const double> wrist_rad) {
   if (!tool.place) throw InputError("tool", "place", "missing", "where the tool sits behind the marker");
   if (tool.wrist.size() > Tool::max_wrist_joints)
     throw InputError("tool", "wrist", fmt::format("{} joints", tool.wrist.size()),
                      fmt::format("at most {}", Tool::max_wrist_joints));
-  internal::expect_wrist(tool, wrist_rad);
-  const std::size_t count = wrist_rad.size();
-  const Rigid3 marker_from_base = turned_about_z(tool.place->azimuth_rad, tool.place->base_in_marker_m);
-  std::array<Rigid3, Tool::max_wrist_joints> marker_from_joint;
-  Rigid3 last = marker_from_base;
-  for (std::size_t i = 0; i < count; ++i)
-    marker_from_joint[i] = last = last * previous_from_joint(tool.wrist[i], wrist_rad[i]);
+  expect_wrist(tool, wrist_rad);
+  std::array<Rigid3, 1 + Tool::max_wrist_joints> frames{
+      turned_about_z(tool.place->azimuth_rad, tool.place->base_in_marker_m)};
+  for (std::size_t i = 0; i < wrist_rad.size(); ++i)
+    frames[i + 1] = frames[i] * previous_from_joint(tool.wrist[i], wrist_rad[i]);
+  return frames;
+}
 
-  TipInMarker tip{last * tool.last_from_tip};
+TipInMarker tip_in_marker(const Tool& tool, std::span<const double> wrist_rad) {
+  const auto frames = internal::joints_in_marker(tool, wrist_rad);
+  const std::size_t count = wrist_rad.size();
+  TipInMarker tip{frames[count] * tool.last_from_tip};
   tip.marker_from_tip.rotation.normalize();
   const Eigen::Vector3d& point = tip.marker_from_tip.translation;
   std::array<Motion, Tool::max_wrist_joints> by_joint;
-  for (std::size_t i = 0; i < count; ++i) by_joint[i] = turn_about_z_of(marker_from_joint[i], point);
+  for (std::size_t i = 0; i < count; ++i) by_joint[i] = turn_about_z_of(frames[i + 1], point);
   const std::span<const Motion> motions(by_joint.data(), count);
-  tip.of_place = place_covariance(tool.place->covariance, turn_about_z_of(marker_from_base, point), motions);
+  tip.of_place = place_covariance(tool.place->covariance, turn_about_z_of(frames[0], point), motions);
   tip.of_readings = readings_covariance(tool, motions);
   tip.covariance_m2 = (tip.of_place + tip.of_readings).topLeftCorner<3, 3>();
   return tip;

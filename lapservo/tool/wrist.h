@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <span>
 #include <string>
 #include <vector>
@@ -13,5 +14,9 @@ std::vector<std::string> wrist_names(const Tool& tool);
 
 /// Throws InputError for another number of readings than the wrist has joints, and for one that is not finite.
 void expect_wrist(const Tool& tool, std::span<const double> wrist_rad);
+
+/// The base and the joints' frames behind it in the marker's frame, as many as the wrist has. Allocates nothing. Throws
+/// as tip_in_marker does.
+std::array<Rigid3, 1 + Tool::max_wrist_joints> joints_in_marker(const Tool& tool, std::span<const double> wrist_rad);
 
 }  // namespace lapservo::internal

@@ -74,12 +74,12 @@ int run(const SimRobotOptions& options) {
   simulated.endoscope.latency_s = options.latency_ms / 1000;
   simulated.endoscope.frame_rate_hz = options.fps;
   simulated.endoscope.real_time = true;
+  simulated.wrist_swing_rad = options.swing_wrist_rad;
   Simulator simulator(rig, simulated, start_of(options, rig, simulated.arm));
   const auto transport = make_transport(options.transport, "lapservo_sim_robot", "--transport");
   SimRobotConfig config;
   config.arm = resolved_name({options.transport, options.arm}, "--arm");
   config.camera = resolved_name({options.transport, options.camera}, "--camera");
-  config.wrist_swing_rad = options.swing_wrist_rad;
   watch_for_interrupts();
   refuse_taken_name(*transport, config, options.arm);
   SimRobot robot(*transport, rig, simulator, config);

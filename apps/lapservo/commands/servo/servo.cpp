@@ -31,6 +31,7 @@
 #include "lapservo/servo/run.h"
 #include "lapservo/servo/servo_log.h"
 #include "lapservo/servo/tip_goals.h"
+#include "lapservo/sim/simulated_wrist.h"
 #include "lapservo/sim/simulator.h"
 #include "recordings/open_bag.h"
 
@@ -57,6 +58,8 @@ JointVector joints_at_start(const ServoOptions& options, const Trajectory& traje
     const JointLimits& limits = run.controller.limits;
     JointState amid_limits;
     amid_limits.q = JointVector::from_vector((limits.lower + limits.upper) / 2);
+    if (const auto& tool = run.rig.instruments.front().tool) amid_limits.wrist_rad = simulated_wrist_rad(*tool, 0);
+    tips.follow(amid_limits);
     refuse_goal(trajectory, duration_s(options), run.rig, run.rig.instruments.front().camera_from_rcm, run.controller,
                 amid_limits, run.trajectory_name);
   }
