@@ -178,6 +178,7 @@ void run(Supervisor& arm, ImageStream& images, Clock& clock, const RunConfig& co
     tips.follow(tick.input.joints);
     if (moving) tips.use(moving->camera_from_rcm(tick.input.time_s));
     tick.input.desired = features.at(since_s);
+    tick.pursues_tip = trajectory.tip_at(since_s).has_value();
     first_sight.check(tick, arm);
     if (tick.seen) tick.input.image = tick.seen->measurement;
     if (moving) {

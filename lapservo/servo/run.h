@@ -39,6 +39,7 @@ struct ControlTick {
   ServoInput input;
   ServoDecision decision;
   std::optional<TrackedImage> seen;  ///< without q and r where the joints contradict them
+  bool pursues_tip = false;          ///< the goal is of the tip: its features are those of the registration
   /// Where a goal of the tip was pursued when `seen` was exposed: the seen tip beside it, ideal pixels.
   std::optional<Eigen::Vector2d> tip_error_px{};
 };

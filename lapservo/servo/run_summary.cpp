@@ -63,9 +63,10 @@ void RunSummary::add(const ControlTick& tick, const std::optional<InstrumentTrut
   if (holds) ++held_[blocked ? block : std::string(to_string(control.reason))];
   held_at_end_ = holds ? std::optional(blocked ? block : reason_text(tick.decision)) : std::nullopt;
   Eigen::Vector4d error = control.error;
-  if (truth && truth->features) {
+  const bool by_truth = truth && !tick.pursues_tip;
+  if (by_truth && truth->features) {
     error = feature_error(*truth->features, tick.input.desired.features);
-  } else if (!truth && !control.estimate) {
+  } else if (!by_truth && !control.estimate) {
     if (converged()) return;
     error.setConstant(std::numeric_limits<double>::infinity());  // not known, and so not small
   }

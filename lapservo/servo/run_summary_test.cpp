@@ -13,6 +13,8 @@ class RunSummaryTest : public ::testing::Test {
     ControlTick tick;
     tick.decision.control.action = action, tick.decision.control.reason = reason;
     tick.decision.registration_contradicted = contradicted;
+    if ((tick.pursues_tip = tip_error_px.has_value())) tick.decision.control.estimate.emplace();
+    tick.tip_error_px = tip_error_px;
     InstrumentTruth truth;
     truth.features = feature_error_rad * Eigen::Vector4d::UnitX();
     for (int i = 0; i < count; ++i, time_s += period_s) tick.input.time_s = time_s, summary.add(tick, truth, block);
@@ -22,6 +24,7 @@ class RunSummaryTest : public ::testing::Test {
   RunSummary summary;
   double time_s = 0, feature_error_rad = 0;
   bool contradicted = false;
+  std::optional<Eigen::Vector2d> tip_error_px;
 };
 
 TEST_F(RunSummaryTest, CountsHoldsByTheirReasonOrTheArms) {
@@ -45,6 +48,15 @@ TEST_F(RunSummaryTest, ErrorsOfHoldsAreNoPartOfTheRms) {
   feature_error_rad = 0;
   add(ControlAction::track, HoldReason::none, 5);
   EXPECT_TRUE(says("rms since while it tracked (held for 30 ticks): s 0.00 mrad")) << summary.text();
+}
+
+// The true features differ from those that a wrong registration has for the tip's place.
+TEST_F(RunSummaryTest, AGoalOfTheTipIsReachedByTheLoopsOwnError) {
+  tip_error_px = Eigen::Vector2d(0.3, 0.4);
+  feature_error_rad = 0.5;
+  add(ControlAction::track, HoldReason::none, 15);
+  EXPECT_TRUE(says("s 0.00 mrad")) << summary.text();
+  EXPECT_TRUE(says("the seen tip 0.50 px from its goal")) << summary.text();
 }
 
 TEST_F(RunSummaryTest, AContradictedRegistrationIsNoSuccessWhenStrict) {
