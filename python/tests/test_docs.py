@@ -49,7 +49,8 @@ NOT_RUN = {
 
 #: Files that pages show, by how their paths begin, and the test that runs them or reads them.
 SHOWN = {"examples/cpp/": "cmake/test_install.cmake", "examples/own_robot/": "cmake/test_install.cmake",
-         "examples/python/ros2_robot": "python/tests/test_ros2.py", "examples/python/": "python/tests/test_examples.py",
+         "examples/python/ros2_robot": "python/tests/test_ros2.py", "examples/python/plot_tip": "docs/tip_tutorial.md",
+         "examples/python/": "python/tests/test_examples.py",
          "transports/ros2/msg/": "transports/ros2/CMakeLists.txt"}
 
 #: A line that is a link to a file, which docs/site/conf.py replaces by the file.
