@@ -32,14 +32,18 @@ double now_s() {
   return seconds(std::chrono::steady_clock::now().time_since_epoch());
 }
 
+std::optional<double> number_of(const HttpRequest& request, const std::string& name) {
+  const auto found = request.query.find(name);
+  return found == request.query.end() ? std::nullopt : parse_finite(found->second);
+}
+
 // When the page sent it, by this clock: what the network or a stopped process kept back is not wanted any more.
 std::optional<double> time_of(const HttpRequest& request) {
-  const auto at = request.query.find("at");
-  return at == request.query.end() ? std::nullopt : parse_finite(at->second);
+  return number_of(request, "at");
 }
 
 // Includes a wrong clock: an old command may be unwanted by now.
-bool is_recent_start(double asked_s) {
+bool is_recent(double asked_s) {
   return std::abs(now_s() - asked_s) <= start_lasts_s;
 }
 
@@ -115,9 +119,10 @@ void LivePage::fetch() {
 
 PageWishes LivePage::take_wishes() {
   PageWishes wishes;
-  if (is_recent_start(start_s_.exchange(never))) wishes.hold = false;
+  if (is_recent(start_s_.exchange(never))) wishes.hold = false;
   if (hold_.exchange(false)) wishes.hold = true;  // of two between ticks, the one that holds
   wishes.stop = stop_;
+  if (const auto tip = tips_.take(); tip && is_recent(tip->asked_s)) wishes.tip_px = tip->at_px;
   return wishes;
 }
 
@@ -165,6 +170,7 @@ HttpResponse LivePage::command(const HttpRequest& request) {
     run_button_.release();
     return plain(202, "released");
   }
+  if (path == "/tip") return want_tip(request);
   if (path != "/hold" && path != "/start") return plain(404, "there is no such command");
   if (!config_.has_loop) return plain(403, "nothing that moves is commanded here");
   if (path == "/start") return start(request);
@@ -176,8 +182,25 @@ HttpResponse LivePage::start(const HttpRequest& request) {
   if (!config_.may_start) return plain(403, "lapservo runs without --enable-motion");
   const auto asked_s = time_of(request);
   if (!asked_s) return plain(400, "a start needs its time: ?at= now_s of /state");
-  if (!is_recent_start(*asked_s)) return plain(409, "it came too late, nothing was started");
+  if (!is_recent(*asked_s)) return plain(409, "it came too late, nothing was started");
   start_s_ = *asked_s;
+  return plain(202, "accepted");
+}
+
+HttpResponse LivePage::want_tip(const HttpRequest& request) {
+  if (!config_.takes_tip_goals) return plain(403, "no goals of the tip are taken here");
+  const auto u_px = number_of(request, "u"), v_px = number_of(request, "v"), asked_s = time_of(request);
+  if (!u_px || !v_px || !asked_s)
+    return plain(400, "a goal of the tip needs its pixel and time: ?u=&v=&at= now_s of /state");
+  if (!is_recent(*asked_s)) return plain(409, "it came too late, the goal stays");
+  {
+    const std::lock_guard lock(mutex_);
+    fetch();
+    const cv::Mat& bgr = newest_.image.bgr;
+    if (!(*u_px >= -0.5 && *u_px <= bgr.cols - 0.5 && *v_px >= -0.5 && *v_px <= bgr.rows - 0.5))
+      return plain(400, "it lies outside of the image");
+  }
+  tips_.put({{*u_px, *v_px}, *asked_s});
   return plain(202, "accepted");
 }
 
@@ -196,9 +219,13 @@ bool LivePage::operator_present() {
 }
 
 HttpResponse LivePage::state() {
-  nlohmann::ordered_json state{{"title", config_.title},         {"has_loop", config_.has_loop},
-                               {"may_start", config_.may_start}, {"has_run_button", config_.has_run_button},
-                               {"live", config_.live},           {"ended", over_.load()}};
+  nlohmann::ordered_json state{{"title", config_.title},
+                               {"has_loop", config_.has_loop},
+                               {"may_start", config_.may_start},
+                               {"has_run_button", config_.has_run_button},
+                               {"live", config_.live},
+                               {"ended", over_.load()},
+                               {"takes_tip_goals", config_.takes_tip_goals}};
   watched_ = true;
   const auto now = std::chrono::steady_clock::now();
   state["now_s"] = seconds(now.time_since_epoch());
@@ -218,7 +245,7 @@ HttpResponse LivePage::state() {
         state["events"].push_back({{"time_s", event.time_s}, {"state", event.state}});
   }
   state["instruments"] = json_of(observations, silent_s);
-  state["asked"] = hold_ ? "hold" : is_recent_start(start_s_) ? "start" : "";
+  state["asked"] = hold_ ? "hold" : is_recent(start_s_) ? "start" : "";
   return {200, "application/json", text_of(state)};
 }
 

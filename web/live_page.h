@@ -29,7 +29,8 @@ struct PageConfig {
   bool live = true;                   ///< images get old; a file's do not
   bool has_loop = false;              ///< a loop that can be held and started
   bool may_start = false;
-  bool has_run_button = false;  ///< see operator_present()
+  bool has_run_button = false;   ///< see operator_present()
+  bool takes_tip_goals = false;  ///< a pixel of the image may be named for the tip to go to
   HttpLimits limits{};
 };
 
@@ -48,12 +49,14 @@ struct PageLoop {
   double delay_s = 0;  ///< of its images
   bool limited = false;
   bool can_start = true;  ///< Supervisor::can_start()
+  std::string answer;     ///< in words, to the last goal of the tip
 };
 
 /// The commands of the page's users.
 struct PageWishes {
-  std::optional<bool> hold;  ///< true: hold; false: start; the last one
-  bool stop = false;         ///< end the run
+  std::optional<bool> hold;               ///< true: hold; false: start; the last one
+  bool stop = false;                      ///< end the run
+  std::optional<Eigen::Vector2d> tip_px;  ///< where in the image the tip is wanted
 };
 
 /// The page for users without a screen on this computer. Its inputs never wait: it keeps the newest image only, and
@@ -75,8 +78,8 @@ class LivePage {
   void end() { over_ = true; }
   /// Whether a browser has shown the page.
   bool was_watched() const { return watched_; }
-  /// The commands since the last call. A start that is not taken within a second is void: its sender does not expect
-  /// motion any more.
+  /// The commands since the last call. A start and a goal of the tip that are not taken within a second are void: their
+  /// sender does not expect motion any more.
   PageWishes take_wishes();
   /// Whether somebody pressed the page's run button throughout since the last call. A press that
   /// the network kept back for longer than HeldButton::max_age_s does not count.
@@ -111,6 +114,7 @@ class LivePage {
   HttpResponse command(const HttpRequest& request);
   HttpResponse start(const HttpRequest& request);
   HttpResponse press(const HttpRequest& request);
+  HttpResponse want_tip(const HttpRequest& request);
   HttpResponse state();
   void draw();
   std::shared_ptr<const Drawn> draw_newest(std::unique_lock<std::mutex>& lock) const;
@@ -128,6 +132,11 @@ class LivePage {
   Mailbox<Told> loops_;
   std::atomic<bool> hold_ = false, stop_ = false, over_ = false, watched_ = false;
   std::atomic<double> start_s_ = never;  ///< when it was requested
+  struct TipWish {
+    Eigen::Vector2d at_px;
+    double asked_s = never;
+  };
+  Mailbox<TipWish> tips_;
 
   HeldButton run_button_;
 

@@ -192,6 +192,44 @@ TEST(LivePage, StartsNothingLate) {
   EXPECT_EQ(page.take_wishes().hold, true);
 }
 
+TEST(LivePage, TakesAPixelForTheTipWhereItMay) {
+  PageConfig config = config_of_test();
+  const Rig rig = testing::small_test_rig();
+  const auto path = [](const std::string& u, const std::string& v, double ago_s = 0) {
+    return "/tip?u=" + u + "&v=" + v + "&" + start_path(ago_s).substr(std::string("/start?").size());
+  };
+  {
+    Served page(config);
+    page.show(image_of(rig, 90));
+    EXPECT_EQ(page.post(path("3", "4")), 403);
+    EXPECT_FALSE(page.take_wishes().tip_px);
+  }
+  config.takes_tip_goals = true;
+  Served page(config);
+  EXPECT_EQ(page.post(path("3", "4")), 400) << "there is no image yet";
+  page.show(image_of(rig, 90));
+  EXPECT_EQ(page.post(path("3", "4")), 202);
+  EXPECT_EQ(page.post(path("20.5", "10.25")), 202);
+  EXPECT_EQ(page.take_wishes().tip_px, Eigen::Vector2d(20.5, 10.25));
+  EXPECT_FALSE(page.take_wishes().tip_px) << "once";
+  EXPECT_EQ(page.post(path("3", "4", 1.1)), 409);
+  const std::string beyond = std::to_string(rig.camera.width_px);
+  for (const std::string& u : {std::string("-1"), beyond, std::string("nan"), std::string("")})
+    EXPECT_EQ(page.post(path(u, "4")), 400) << u;
+  EXPECT_EQ(page.post("/tip?u=3&v=4"), 400);
+  EXPECT_EQ(
+      http_status(http(page.port, "POST", path("3", "4"), "Origin: http://evil.example\r\nContent-Length: 0\r\n")),
+      403);
+  EXPECT_FALSE(page.take_wishes().tip_px);
+  EXPECT_EQ(page.post(path("3", "4", 0.9)), 202);
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  EXPECT_FALSE(page.take_wishes().tip_px) << "its sender does not expect it any more";
+  PageLoop loop;
+  loop.answer = "refused: tip_goal";
+  page.tell(loop, "track");
+  EXPECT_TRUE(page.tells(R"("answer":"refused: tip_goal")"));
+}
+
 // Without an answer in time, a pressed button is a released one.
 TEST(LivePage, TheRunButtonIsPressedWhileThePageSaysSo) {
   PageConfig config = config_of_test();

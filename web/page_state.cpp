@@ -67,11 +67,8 @@ json json_of(const PageLoop& loop) {
                         {"desired", four(loop.desired, i)},
                         {"error", four(loop.error, i)}});
   }
-  return {{"time_s", loop.time_s},
-          {"delay_s", loop.delay_s},
-          {"limited", loop.limited},
-          {"can_start", loop.can_start},
-          {"features", features}};
+  return {{"time_s", loop.time_s},       {"delay_s", loop.delay_s}, {"limited", loop.limited},
+          {"can_start", loop.can_start}, {"answer", loop.answer},   {"features", features}};
 }
 
 std::string text_of(const json& value) {

@@ -251,6 +251,56 @@ def see_the_loop(browser, tool, rig, folder):
         lapservo.wait()
 
 
+def see_the_tip(browser, tool, rig, folder):
+    """Shift and a click, confirmed, move it; a click alone, or one that is cancelled, does not."""
+    with tempfile.NamedTemporaryFile("w", suffix=".yaml") as with_tool:
+        with_tool.write(pathlib.Path(rig).read_text() + "    tool: {tip_in_marker_m: [0, 0, 0.045]}\n")
+        with_tool.flush()
+        lapservo, url = start(tool, "servo", "--rig", with_tool.name, "--robot", "sim", "--duration", "3600", "--web", "0")
+
+    def click(shift, right, down):
+        box = browser.value("(b => ({x: b.x, y: b.y, w: b.width, h: b.height}))(document.getElementById('picture').getBoundingClientRect())")
+        for what in ("mousePressed", "mouseReleased"):
+            browser.call("Input.dispatchMouseEvent", type=what, button="left", clickCount=1, modifiers=8 if shift else 0,
+                         x=box["x"] + right * box["w"], y=box["y"] + down * box["h"])
+
+    try:
+        browser.call("Page.navigate", url="about:blank")  # the page of the run before still polls
+        time.sleep(1)
+        browser.value("1")
+        browser.complaints.clear()
+        browser.call("Page.navigate", url=url)
+        browser.resize(1280, 800)
+        state(browser, "track")
+        browser.wait_for("document.getElementById('picture').naturalWidth > 0")
+        asked = "!document.getElementById('tip').hidden"
+        click(False, 0.6, 0.6)
+        assert not browser.value(asked), "a click alone is a goal"
+        click(True, 0.6, 0.6)
+        browser.wait_for(asked)
+        place = browser.value("(r => [r.x + r.width / 2, r.y + r.height / 2])(document.getElementById('target').getBoundingClientRect())")
+        box = browser.value("(b => [b.x + 0.6 * b.width, b.y + 0.6 * b.height])(document.getElementById('picture').getBoundingClientRect())")
+        assert max(abs(a - b) for a, b in zip(place, box)) < 2, (place, box)
+        look(browser, folder, "tip")
+        browser.resize(1280, 800)
+        browser.click("cancel")
+        assert not browser.value(asked) and browser.value("last.loop.answer") == ""
+        for right, down, words in ((0.01, 0.01, "refused: tip_goal: "), (0.6, 0.6, "a goal of the tip came")):
+            click(True, right, down)
+            browser.wait_for(asked)
+            browser.click("move")
+            browser.wait_for(f"document.getElementById('note').textContent.startsWith('tip: {words}')")
+            assert not browser.value(asked)
+        assert not browser.complaints, browser.complaints
+        browser.value("document.getElementById('stop').click()")
+        assert lapservo.wait(PATIENCE_S) in (0, 1)
+        said = lapservo.stdout.read()
+        assert "a goal of the tip came" in said, said
+    finally:
+        lapservo.kill()
+        lapservo.wait()
+
+
 def goes_on_tracking(browser, press):
     browser.value("document.getElementById('run').focus()")
     press()
@@ -375,6 +425,7 @@ def main():
         try:
             see_a_picture(browser, tool, picture_rig, picture, folder)
             see_the_loop(browser, tool, rig, folder)
+            see_the_tip(browser, tool, rig, folder)
             see_the_run_button(browser, tool, rig)
         finally:
             browser.close()

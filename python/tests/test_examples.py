@@ -1,9 +1,11 @@
+import json
 import os
 import shutil
 import signal
 import subprocess
 import sys
 import time
+import urllib.request
 
 import lapservo
 import numpy as np
@@ -30,6 +32,22 @@ def test_examples_run(tmp_path):
     assert "mrad" in run("marker_5mm.py", tmp_path / "sheet.pdf")
     assert (tmp_path / "sheet.pdf").is_file()
     assert "largest errors" in run("own_robot.py", RIG)
+
+
+def test_the_tip_goes_to_pixels_of_the_page(tmp_path):
+    (tmp_path / "tip.yaml").write_text(RIG.read_text() + "    tool: {tip_in_marker_m: [0, 0, 0.045]}\n")
+    servo = subprocess.Popen([os.environ["LAPSERVO_TOOL"], "servo", "--rig", tmp_path / "tip.yaml", "--robot", "sim", "--duration", "3600",
+                              "--web", "0"], stdout=subprocess.PIPE, text=True)
+    try:
+        page = servo.stdout.readline().split()[1]
+        while json.load(urllib.request.urlopen(f"{page}state"))["images"] < 10:
+            time.sleep(0.1)
+        near, corner = run("move_tip.py", page, "760,430", "1,1").splitlines()
+        assert near.startswith("760,430: a goal of the tip came"), near
+        assert corner.startswith("1,1: refused: tip_goal: "), corner
+    finally:
+        servo.kill()
+        servo.wait()
 
 
 def test_an_example_without_arguments_says_what_it_needs():

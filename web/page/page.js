@@ -76,6 +76,7 @@ function showState(state) {
   if (!at("note").dataset.said)
     text(at("note"), state.has_loop && !state.may_start ? "Start needs lapservo servo --enable-motion." : at("start").disabled ? "Start needs an arm that is ready." : "");
   showLoop(state);
+  showAnswer(state.loop);
   at("instruments").replaceChildren(...state.instruments.map(instrumentTable));
 }
 
@@ -91,7 +92,7 @@ function showAges() {
   const silentS = heardMs === null ? null : (now - heardMs) / 1000;
   const lost = silentS === null || silentS > 2 || failed > 2;
   at("buttons").hidden = lost || last.ended;
-  if (at("buttons").hidden) release();
+  if (at("buttons").hidden) release(), choose(null);
   at("alert").hidden = !lost || heardMs === null;
   if (!at("alert").hidden) text(at("alert"), `No answer for ${Math.round(silentS)} s: lapservo has ended, or the network is gone. What you see is old.`);
   const ageS = pictureCameMs === null ? null : (now - pictureCameMs) / 1000;
@@ -165,13 +166,13 @@ function serverNowS() {
   return ((performance.now() + clock.aheadMs - clock.tookMs / 2) / 1000).toFixed(4);
 }
 
-async function command(name) {
+async function command(name, path = name === "start" ? `start?at=${serverNowS()}` : name) {
   at("start").blur();
   const note = at("note");
   note.dataset.said = "yes";
   text(note, `${name} …`);
   try {
-    const answer = await ask(name === "start" ? `start?at=${serverNowS()}` : name, { method: "POST" });
+    const answer = await ask(path, { method: "POST" });
     text(note, `${name}: ${(await answer.text()).trim()}`);
   } catch {
     text(note, `${name}: no answer, it may have arrived`);
@@ -187,6 +188,35 @@ document.addEventListener("keydown", (event) => {
   if (!isH || event.ctrlKey || event.altKey || event.metaKey || event.repeat) return;
   if (!at("hold").disabled) command("hold");
 });
+
+// Shift and a click name a place for the tip; nothing is sent before it is confirmed, and nothing moves that is held.
+let target = null, answered = "";
+
+function choose(pixel, place) {
+  target = pixel;
+  at("tip").hidden = at("target").hidden = !target;
+  if (target) Object.assign(at("target").style, place);
+}
+
+at("picture").addEventListener("click", (event) => {
+  if (!event.shiftKey || !last || !last.takes_tip_goals || at("buttons").hidden) return;
+  const picture = at("picture"), x = event.offsetX / picture.clientWidth, y = event.offsetY / picture.clientHeight;
+  choose({ u: x * picture.naturalWidth - 0.5, v: y * picture.naturalHeight - 0.5 }, { left: `${100 * x}%`, top: `${100 * y}%` });
+});
+at("move").addEventListener("click", () => {
+  const { u, v } = target;
+  choose(null);
+  answered = last.loop ? last.loop.answer : "";
+  command("tip", `tip?u=${u.toFixed(1)}&v=${v.toFixed(1)}&at=${serverNowS()}`);
+});
+at("cancel").addEventListener("click", () => choose(null));
+
+function showAnswer(loop) {
+  if (!loop || loop.answer === answered) return;
+  answered = loop.answer;
+  at("note").dataset.said = "yes";
+  text(at("note"), `tip: ${answered}`);
+}
 
 // The run button: while it is pressed the page says so, again and again. After 0.2 s without a word lapservo takes it
 // for released. A press also starts, where this page may.

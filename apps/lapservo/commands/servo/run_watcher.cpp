@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "apps/lapservo/cli/interrupt.h"
+#include "lapservo/core/error.h"
 
 namespace lapservo::app {
 using namespace internal;
@@ -27,6 +28,20 @@ bool RunWatcher::ends_by_page(const ControlTick& tick, double time_s) {
   const bool ends = page_->command(*arm_, tick.input.time_s);
   if (ends) say(time_s, "end: requested on the page");
   return ends;
+}
+
+void RunWatcher::follow_goal(ChangingGoal& goal, const ControlTick& tick, double time_s) {
+  std::optional<std::string> said;
+  try {
+    if (const auto wanted = page_ ? page_->tip_goal() : std::nullopt)
+      goal.want("tip_goal", 0, tip_set_point(*wanted, "tip_goal"));
+    said = goal.follow(tick, time_s);
+  } catch (const InputError& error) {
+    said = std::string("refused: ") + error.what();
+  }
+  if (!said) return;
+  say(time_s, *said);
+  if (page_) page_->answer(time_s, *said);
 }
 
 bool RunWatcher::commit_log() {

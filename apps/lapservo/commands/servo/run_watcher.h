@@ -5,6 +5,7 @@
 #include <string>
 #include <utility>
 
+#include "apps/lapservo/commands/servo/changing_goal.h"
 #include "apps/lapservo/commands/servo/servo_options.h"
 #include "apps/lapservo/commands/servo/servo_output.h"
 #include "apps/lapservo/commands/servo/servo_page.h"
@@ -31,6 +32,8 @@ class RunWatcher : public RunObserver {
   /// `time_s`: since the first tick. False ends the run.
   virtual bool follow(const ControlTick& tick, double time_s) = 0;
   virtual std::optional<InstrumentTruth> truth() const { return std::nullopt; }
+  /// Passes the page's goals of the tip on, and reports on all goals.
+  void follow_goal(ChangingGoal& goal, const ControlTick& tick, double time_s);
   /// In words, of this tick; and whether it is another one than the tick's before.
   const std::string& state() const { return state_; }
   bool is_new_state() const { return is_new_state_; }

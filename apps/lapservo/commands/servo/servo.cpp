@@ -70,15 +70,17 @@ JointVector joints_at_start(const ServoOptions& options, const Trajectory& traje
 class SimulationWatcher : public RunWatcher {
  public:
   SimulationWatcher(const ServoOptions& options, std::unique_ptr<RunFolder> folder, Supervisor& arm, ServoPage* page,
-                    FeatureModel true_model, const Simulator& simulator, int ticks)
+                    FeatureModel true_model, const Simulator& simulator, ChangingGoal& goal, int ticks)
       : RunWatcher(options, std::move(folder), &arm, page),
         true_model_(std::move(true_model)),
         simulator_(simulator),
+        goal_(goal),
         progress_(ticks) {}
   void end_progress() { progress_.clear(); }
 
  private:
-  bool follow(const ControlTick& tick, double) override {
+  bool follow(const ControlTick& tick, double time_s) override {
+    follow_goal(goal_, tick, time_s);
     progress_.show(++done_, fmt::format(" ({})", to_string(tick.decision.control.action)));
     return true;
   }
@@ -86,6 +88,7 @@ class SimulationWatcher : public RunWatcher {
 
   FeatureModel true_model_;
   const Simulator& simulator_;
+  ChangingGoal& goal_;
   Progress progress_;
   int done_ = 0;
 };
@@ -110,9 +113,10 @@ int simulate(const ServoOptions& options) {
   auto folder = run_folder(options, duration_s(options), believed_rig, config.controller, &true_rig);
   watch_for_interrupts();
 
-  SimulationWatcher watcher(options, std::move(folder), arm, page ? &*page : nullptr, true_model, simulator,
+  ChangingGoal goal(trajectory, config);
+  SimulationWatcher watcher(options, std::move(folder), arm, page ? &*page : nullptr, true_model, simulator, goal,
                             static_cast<int>(std::lround(duration_s(options) / config.controller.period_s)));
-  lapservo::run(arm, simulator, simulator, config, trajectory, duration_s(options), watcher);
+  lapservo::run(arm, simulator, simulator, config, goal.trajectory(), duration_s(options), watcher);
   watcher.end_progress();
   std::printf("method %s, seen by %s\n%s\n", std::string(to_string(config.controller.mode)).c_str(),
               config.tracker.method == Method::centerline ? "the paper's Algorithm 1" : "all visible lines",

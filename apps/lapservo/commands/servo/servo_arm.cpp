@@ -3,7 +3,6 @@
 #include <chrono>
 #include <cstdio>
 #include <functional>
-#include <future>
 #include <memory>
 #include <optional>
 #include <set>
@@ -14,6 +13,7 @@
 #include <fmt/format.h>
 
 #include "apps/lapservo/cli/interrupt.h"
+#include "apps/lapservo/commands/servo/changing_goal.h"
 #include "apps/lapservo/commands/servo/run_watcher.h"
 #include "apps/lapservo/inputs/live_images.h"
 #include "apps/lapservo/inputs/transports.h"
@@ -26,7 +26,6 @@
 #include "lapservo/robot/real_time.h"
 #include "lapservo/robot/steady_clock.h"
 #include "lapservo/robot/supervisor.h"
-#include "lapservo/servo/goal_check.h"
 #include "lapservo/tool/wrist.h"
 
 namespace lapservo::app {
@@ -48,25 +47,11 @@ std::string name_in_use(const Rig& rig) {
                      rig.instruments.front().name);
 }
 
-// The trajectory, until somebody wants a setpoint instead. All in the loop's thread.
-class Goal {
- public:
-  explicit Goal(Trajectory trajectory) : trajectory_(std::make_shared<Trajectory>(std::move(trajectory))) {}
-  Trajectory trajectory() const {
-    return {0, [current = trajectory_](double time_s) { return current->at(time_s); },
-            [current = trajectory_](double time_s) { return current->tip_at(time_s); }};
-  }
-  void replace(Trajectory trajectory) { *trajectory_ = std::move(trajectory); }
-
- private:
-  std::shared_ptr<Trajectory> trajectory_;
-};
-
 // Every change is reported once, in one line.
 class ArmWatcher : public RunWatcher {
  public:
   ArmWatcher(const ServoOptions& options, std::unique_ptr<RunFolder> folder, Supervisor& arm, ServoPage* page,
-             const RunConfig& run, const CrtkRobot& robot, LiveImages& images, LoopTopics& topics, Goal& goal)
+             const RunConfig& run, const CrtkRobot& robot, LiveImages& images, LoopTopics& topics, ChangingGoal& goal)
       : RunWatcher(options, std::move(folder), &arm, page),
         run_(run),
         arm_(arm),
@@ -100,41 +85,10 @@ class ArmWatcher : public RunWatcher {
     constexpr std::size_t most_said = 100;
     for (const std::string& remark : wishes.remarks)
       if (said_remarks_.size() < most_said && said_remarks_.insert(remark).second) say(time_s, remark);
-    if (wishes.set_point) wanted_ = Wanted{"set_point", 1, set_point(*wishes.set_point)};
-    if (wishes.tip_goal) wanted_ = Wanted{"tip_goal", 0, tip_set_point(*wishes.tip_goal, "tip_goal")};
-    if (wishes.trajectory) wanted_ = Wanted{"trajectory", wishes.trajectory->duration_s, *wishes.trajectory};
-    const ServoDecision& decision = tick.decision;
-    if (refusal_.valid() && refusal_.wait_for(std::chrono::seconds(0)) == std::future_status::ready) {
-      const std::string refusal = refusal_.get();
-      if (!wanted_ && asked_.registration != decision.registration) {
-        wanted_ = asked_;  // it was checked for an earlier place of the endoscope
-      } else if (!wanted_) {
-        begin_or_refuse(refusal, time_s);
-      }
-    }
-    const bool being_measured = run_.rig.instruments.front().camera_from_rcm && !decision.camera_from_rcm;
-    if (!wanted_ || refusal_.valid() || being_measured) return;
-    asked_ = *std::exchange(wanted_, std::nullopt);
-    asked_.registration = decision.registration;
-    // A long trajectory takes longer to walk along than a tick has.
-    refusal_ = std::async(
-        std::launch::async,
-        [this, wanted = asked_, joints = tick.input.joints, rcm = decision.camera_from_rcm]() -> std::string {
-          try {
-            refuse_goal(wanted.trajectory, wanted.duration_s, run_.rig, rcm, run_.controller, joints, wanted.name);
-          } catch (const InputError& error) {
-            return error.what();
-          }
-          return {};
-        });
-  }
-  void begin_or_refuse(const std::string& refusal, double time_s) {
-    if (!refusal.empty()) return say(time_s, "refused: " + refusal);
-    goal_.replace({0, [at = asked_.trajectory.at, time_s](double now_s) { return at(now_s - time_s); },
-                   [asked = asked_.trajectory, time_s](double now_s) { return asked.tip_at(now_s - time_s); }});
-    const std::string& name = asked_.name;
-    const char* kind = name == "tip_goal" ? "goal of the tip" : name == "set_point" ? "setpoint" : "trajectory";
-    say(time_s, std::string("a ") + kind + " came");
+    if (wishes.set_point) goal_.want("set_point", 1, set_point(*wishes.set_point));
+    if (wishes.tip_goal) goal_.want("tip_goal", 0, tip_set_point(*wishes.tip_goal, "tip_goal"));
+    if (wishes.trajectory) goal_.want("trajectory", wishes.trajectory->duration_s, *wishes.trajectory);
+    follow_goal(goal_, tick, time_s);
   }
   void say_images(double time_s) {
     if (const auto ended = images_.ended(); ended && !said_ended_) {
@@ -159,21 +113,12 @@ class ArmWatcher : public RunWatcher {
   const CrtkRobot& robot_;
   LiveImages& images_;
   LoopTopics& topics_;
-  Goal& goal_;
-  struct Wanted {
-    std::string name;
-    double duration_s = 0;
-    Trajectory trajectory;
-    int registration = 0;  ///< ServoDecision::registration when it was requested
-  };
-  std::optional<Wanted> wanted_;  // to be checked next
-  Wanted asked_;
+  ChangingGoal& goal_;
   double next_counts_s_ = 0, next_set_point_s_ = 0;
   std::string said_counts_;
   std::set<std::string> said_remarks_;
   bool said_ended_ = false;
   std::size_t said_motions_ = 0;
-  std::future<std::string> refusal_;  // of the checked goal, empty when it can be followed; last: it uses the others
 };
 
 int end_by_page() {
@@ -281,7 +226,7 @@ int steer_arm(const ServoOptions& options) {
     std::printf("setpoints leave without %s, see docs/ros.md\n", not_granted.c_str());
   auto folder = run_folder(options, duration_s(options), rig, config.controller);
 
-  Goal goal(trajectory);
+  ChangingGoal goal(trajectory, config);
   ArmWatcher watcher(options, std::move(folder), arm, its_page, config, robot, images, topics, goal);
   if (page && page->command(arm, clock.now_s())) return end_by_page();
   request_real_time(loop_priority);  // the robot has said what is not granted

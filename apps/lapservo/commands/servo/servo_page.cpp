@@ -2,16 +2,22 @@
 
 #include <utility>
 
+#include <fmt/format.h>
+
+#include "lapservo/core/error.h"
+
 namespace lapservo::app {
 using namespace internal;
 namespace {
 
-PageConfig config_of(const ServoOptions& options, const std::string& title, bool may_start) {
+PageConfig config_of(const ServoOptions& options, const Rig& rig, const std::string& title, bool may_start) {
+  const Instrument& instrument = rig.instruments.front();
   PageConfig config;
   config.title = title;
   config.has_loop = may_command(options, "page");
   config.may_start = may_start;
   config.has_run_button = options.page_says_operator_present();
+  config.takes_tip_goals = config.has_loop && instrument.camera_from_rcm && instrument.tool && instrument.tool->place;
   return config;
 }
 
@@ -32,7 +38,7 @@ PageLoop loop_of(const ControlTick& tick, double time_s) {
 }  // namespace
 
 ServoPage::ServoPage(const ServoOptions& options, const Rig& rig, const std::string& title, bool may_start)
-    : web_(options.web, config_of(options, title, may_start)), rig_(std::make_shared<const Rig>(rig)) {}
+    : web_(options.web, config_of(options, rig, title, may_start)), rig_(std::make_shared<const Rig>(rig)) {}
 
 void ServoPage::tell(const ControlTick& tick, double time_s, const std::string& state, bool can_start) {
   if (tick.decision.registration != registration_) {
@@ -41,15 +47,34 @@ void ServoPage::tell(const ControlTick& tick, double time_s, const std::string& 
     rig_ = std::make_shared<const Rig>(std::move(now));
     registration_ = tick.decision.registration;
   }
-  if (tick.seen)
+  if (tick.seen) {
+    const Observation& seen = tick.seen->observations.front();
+    seen_m_ = seen.tip ? std::optional(seen.tip->camera_from_tip.translation) : std::nullopt;
+    first_from_camera_ = tick.seen->first_from_camera;
     web_.show({tick.seen->image.bgr, rig_, tick.seen->observations, tick.input.time_s - tick.seen->image.time_s});
+  }
   PageLoop loop = loop_of(tick, time_s);
   loop.can_start = can_start;
+  loop.answer = answer_;
   web_.tell(loop, state);
+}
+
+std::optional<TipGoal> ServoPage::tip_goal() {
+  const auto wanted_px = std::exchange(tip_px_, std::nullopt);
+  if (!wanted_px) return std::nullopt;
+  const auto ideal_px = rig_->camera.ideal_from_raw(*wanted_px);
+  if (!ideal_px) throw InputError("tip_goal", "lies where the lens shows nothing");
+  if (!seen_m_) throw InputError("tip_goal", "needs the tip's depth, and the image does not show the tip now");
+  return TipGoal{first_from_camera_ * Eigen::Vector3d(seen_m_->z() * rig_->camera.ray_from_ideal(*ideal_px))};
+}
+
+void ServoPage::answer(double time_s, const std::string& words) {
+  answer_ = fmt::format("{} ({:.1f} s)", words, time_s);
 }
 
 bool ServoPage::command(Supervisor& arm, double now_s) {
   const PageWishes wishes = web_.wishes();
+  if (wishes.tip_px) tip_px_ = wishes.tip_px;
   if (wishes.hold) *wishes.hold ? arm.stop(Commander::page) : arm.start(Commander::page, now_s);
   return wishes.stop;
 }

@@ -19,6 +19,11 @@ class ServoPage {
 
   /// `state`: in words.
   void tell(const ControlTick& tick, double time_s, const std::string& state, bool can_start);
+  /// Where the page wants the tip: at a pixel of the newest image, at the tip's present depth; in the frame of the
+  /// loop's goals. Throws InputError where the tip is not seen.
+  std::optional<TipGoal> tip_goal();
+  /// The answer to goals, in words.
+  void answer(double time_s, const std::string& words);
   /// Passes the page's commands on; true when one ends the run.
   bool command(Supervisor& arm, double now_s);
   /// The page's run button.
@@ -28,6 +33,10 @@ class ServoPage {
   WebView web_;
   std::shared_ptr<const Rig> rig_;  ///< with the camera_from_rcm that the loop goes by
   int registration_ = 0;
+  std::optional<Eigen::Vector2d> tip_px_;  ///< where it is wanted
+  std::optional<Eigen::Vector3d> seen_m_;  ///< the tip in the newest image
+  Rigid3 first_from_camera_;               ///< of that image
+  std::string answer_;
 };
 
 }  // namespace lapservo::app

@@ -1,0 +1,68 @@
+#include "apps/lapservo/commands/servo/changing_goal.h"
+
+#include <chrono>
+#include <utility>
+
+#include "lapservo/core/error.h"
+#include "lapservo/servo/goal_check.h"
+
+namespace lapservo::app {
+using namespace internal;
+
+ChangingGoal::ChangingGoal(Trajectory first, const RunConfig& run)
+    : run_(run), now_(std::make_shared<Trajectory>(std::move(first))) {}
+
+Trajectory ChangingGoal::trajectory() const {
+  return {0, [current = now_](double time_s) { return current->at(time_s); },
+          [current = now_](double time_s) { return current->tip_at(time_s); }};
+}
+
+void ChangingGoal::want(const std::string& name, double duration_s, Trajectory trajectory) {
+  wanted_ = Wanted{name, duration_s, std::move(trajectory)};
+}
+
+std::optional<std::string> ChangingGoal::follow(const ControlTick& tick, double time_s) {
+  auto said = result(tick.decision, time_s);
+  check_next(tick);
+  return said;
+}
+
+std::optional<std::string> ChangingGoal::result(const ServoDecision& decision, double time_s) {
+  if (!refusal_.valid() || refusal_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return std::nullopt;
+  const std::string refusal = refusal_.get();
+  if (wanted_) return std::nullopt;
+  if (asked_.registration != decision.registration) {
+    wanted_ = asked_;  // it was checked for an earlier place of the endoscope
+    return std::nullopt;
+  }
+  if (!refusal.empty()) return "refused: " + refusal;
+  *now_ = {0, [at = asked_.trajectory.at, time_s](double now_s) { return at(now_s - time_s); },
+           [asked = asked_.trajectory, time_s](double now_s) { return asked.tip_at(now_s - time_s); }};
+  const std::string& name = asked_.name;
+  return std::string("a ") +
+         (name == "tip_goal"    ? "goal of the tip"
+          : name == "set_point" ? "setpoint"
+                                : "trajectory") +
+         " came";
+}
+
+void ChangingGoal::check_next(const ControlTick& tick) {
+  const ServoDecision& decision = tick.decision;
+  const bool being_measured = run_.rig.instruments.front().camera_from_rcm && !decision.camera_from_rcm;
+  if (!wanted_ || refusal_.valid() || being_measured) return;
+  asked_ = *std::exchange(wanted_, std::nullopt);
+  asked_.registration = decision.registration;
+  // A long trajectory takes longer to walk along than a tick has.
+  refusal_ = std::async(
+      std::launch::async,
+      [this, wanted = asked_, joints = tick.input.joints, rcm = decision.camera_from_rcm]() -> std::string {
+        try {
+          refuse_goal(wanted.trajectory, wanted.duration_s, run_.rig, rcm, run_.controller, joints, wanted.name);
+        } catch (const InputError& error) {
+          return error.what();
+        }
+        return {};
+      });
+}
+
+}  // namespace lapservo::app
