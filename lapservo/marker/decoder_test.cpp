@@ -103,18 +103,6 @@ TEST(CrossRatioDecoder, InvertsAskewPrints) {
   EXPECT_GT(decodable, 300);
 }
 
-// The cross-ratio does not depend on a common shift of all boundaries.
-TEST(CrossRatioDecoder, DoesNotSeeTheWrap) {
-  Marker marker = marker_with({0.0035, 0.0035, 0.017}, {0.0095, 0.0095, 0.005});
-  const CrossRatioDecoder square(marker);
-  marker.wrap_m = 1.4e-3;
-  const CrossRatioDecoder wrapped(marker);
-  for (int i = 0; i < 50; ++i) {
-    const double ratio = 1 + 0.02 * i;
-    EXPECT_NEAR(square.tau_rad(ratio), wrapped.tau_rad(ratio), 1e-9);
-  }
-}
-
 TEST(Marker, CrossRatioIsTheSameInEveryPerspectiveImage) {
   Random random(seed);
   int checked = 0;
