@@ -212,19 +212,6 @@ TEST(ProjectedRcm, LeavesOutOutliersAndNamesThem) {
   EXPECT_NEAR(std::sqrt(spread), 1.06, 0.14) << "seed " << seed;
 }
 
-TEST(ProjectedRcm, BeatsTheMeanOfIntersections) {
-  constexpr std::uint64_t seed = 78;
-  Random random(seed);
-  const Eigen::Vector2d truth(-120, -240);
-  double ours = 0, papers = 0;
-  for (int trial = 0; trial < 200; ++trial) {
-    const Lines lines = with_errors(testing::fan_of_lines(truth, 20, fan_rad, random), 1, random);
-    ours += (estimate_projected_rcm(lines, {NoiseScale::estimated}).point_px - truth).norm();
-    papers += (mean_of_intersections(lines)->point_px - truth).norm();
-  }
-  EXPECT_LT(ours, 0.7 * papers) << "seed " << seed;
-}
-
 TEST(ProjectedRcm, WarnsOfNearlyParallelLines) {
   constexpr std::uint64_t seed = 79;
   Random random(seed);
