@@ -151,14 +151,6 @@ TEST(CentreLine, IsAbsentBehindTheCameraAndAroundIt) {
   EXPECT_FALSE(centre_line(rig.camera, marker, {Eigen::Quaterniond::Identity(), {0.001, 0, 0.1}}, 0));
 }
 
-TEST(Features, CrossRatioInTheImageIsThatOnTheMarker) {
-  for_random_configurations(
-      [](const Camera&, const Instrument& instrument, const JointVector&, const CentreLine& line) {
-        EXPECT_NEAR(features_of(line.ideal_px, std::nullopt).cross_ratio,
-                    cross_ratio_at(instrument.marker, line.tau_rad), 1e-9);
-      });
-}
-
 TEST(Features, MeasureAnglesFromTheVerticalAndDistances) {
   const std::array<Eigen::Vector2d, 4> down{{{10, 10}, {10, 20}, {10, 40}, {10, 70}}};
   const Features f = features_of(down, Eigen::Vector2d(10, -20));
