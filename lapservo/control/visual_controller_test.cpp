@@ -261,16 +261,6 @@ TEST(VisualController, SendsNothingBeforeTheFirstMeasuredJoints) {
   EXPECT_EQ(first.setpoint.position, q);
 }
 
-TEST(VisualController, BrakesByItselfWhenNoStepComes) {
-  const ControllerConfig config = testing::test_config({});
-  const TestRig rig;
-  VisualController controller(config, testing::model_of(rig));
-  TestSimulator simulator(rig, usual_flaws(), {0.05, 1.57, 0.064, 1}, 3);
-  const auto moments = simulator.run(controller, sinusoids(paper_sinusoids()), 1);
-  ASSERT_GT(moments.back().step.velocity.norm(), 0);
-  EXPECT_TRUE(controller.path().at(moments.back().time_s + 1).velocity.isZero());
-}
-
 TEST(VisualController, BacklashLeavesNoBias) {
   Flaws flaws = usual_flaws();
   flaws.backlash = {0, 0, 0.0002, 0.035};
@@ -368,14 +358,6 @@ TEST(VisualController, LearnsBacklashSoThatReversalsLeaveLittleError) {
     if (flaws.latency_s <= 0.15) {
       EXPECT_LT(rms.cwiseQuotient(rms_at_zero).maxCoeff(), 1.2);
     }
-  });
-}
-
-// All joints turn at once there, twice a period.
-TEST(VisualController, LearnsBacklashOnThePapersTrajectoryToo) {
-  expect_backlash_learnt(sinusoids(paper_sinusoids()), 60, [](const std::vector<Moment>& moments, const Flaws&) {
-    EXPECT_LT(rms_after(moments, 30)[0], 1e-4);
-    EXPECT_LT(rms_after(moments, 30).tail<3>().maxCoeff(), 0.1);
   });
 }
 
