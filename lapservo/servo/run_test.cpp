@@ -24,7 +24,6 @@
 #include "lapservo/core/minimum_jerk.h"
 #include "lapservo/core/random.h"
 #include "lapservo/geometry/rotation.h"
-#include "lapservo/kinematics/tip_kinematics.h"
 #include "lapservo/robot/steady_clock.h"
 #include "lapservo/servo/convergence.h"
 #include "lapservo/servo/image_features.h"
@@ -52,18 +51,14 @@ Trajectory small_trajectory() {
 struct Case {
   std::uint64_t seed = 1;
   double latency_s = 0.08, duration_s = 8;
-  std::optional<Interval> faulted;
   ControlMode mode = ControlMode::fused;
   TrackingThread thread = TrackingThread::callers;
-  std::optional<Interval> frozen{};  ///< the image from its beginning arrives again and again
-  bool new_stamps = true;            ///< then, as if it were new
   std::optional<EndoscopeMotion> endoscope{};
   bool operated = true;  ///< then somebody moves the released arm, and says start
   double exposure_s = 0;
   float smoke = 0;
   std::vector<Blotch> blotches{};
   std::optional<Interval> dark{};
-  double start_s = 1e9;                   ///< then somebody says start
   std::optional<double> arm_error_rad{};  ///< of the arm that holds the endoscope: then its pose is known but for this
   std::function<void(SimulatorConfig&)> change{};
 };
@@ -123,7 +118,6 @@ class OperatedArm : public Robot {
   }
   std::vector<JointReading> readings() override { return simulator_.readings(); }
   void send(const JointPath& path) override { simulator_.send(path); }
-  void start() { started_ = true; }
   bool is_simulated() const override { return true; }
 
   void operate(const ServoDecision& decision, double time_s) {
@@ -154,16 +148,12 @@ class OperatedArm : public Robot {
 
 class Watcher : public RunObserver {
  public:
-  Watcher(const Case& c, const Rig& rig, Simulator& simulator, OperatedArm* operated = nullptr)
-      : case_(c), rig_(rig), simulator_(simulator), operated_(operated) {}
+  Watcher(const Rig& rig, Simulator& simulator, OperatedArm* operated = nullptr)
+      : rig_(rig), simulator_(simulator), operated_(operated) {}
 
   bool on_tick(const ControlTick& tick) override {
     const double time_s = tick.input.time_s;
-    SimulatedArm& arm = simulator_.arm();
-    if (case_.faulted && case_.faulted->contains(time_s) && !arm.faulted()) arm.fault();
-    if (case_.faulted && time_s >= case_.faulted->end_s && arm.faulted()) arm.recover();
     if (operated_) operated_->operate(tick.decision, time_s);
-    if (operated_ && std::abs(time_s - case_.start_s) < 1e-9) operated_->start();
     const Rigid3 camera_from_first_camera = simulator_.camera_from_first_camera();
     const Rigid3 camera_from_rcm = camera_from_first_camera * *rig_.instruments[0].camera_from_rcm;
     done.records.push_back({tick.input, tick.decision,
@@ -177,7 +167,6 @@ class Watcher : public RunObserver {
   PastRun done;
 
  private:
-  Case case_;
   Rig rig_;
   Simulator& simulator_;
   OperatedArm* operated_;
@@ -185,69 +174,6 @@ class Watcher : public RunObserver {
 
 // So long a wait means that something hangs.
 constexpr std::chrono::seconds hangs(60);
-
-// The simulator for a tracker with a thread of its own. Simulated time waits until all that arrived has been tracked,
-// so that the run does not depend on how fast the computer is.
-class InStep : public Robot, public ImageStream, public Clock {
- public:
-  explicit InStep(Simulator& simulator) : simulator_(simulator) {}
-
-  JointState state() override {
-    const std::lock_guard lock(mutex_);
-    return simulator_.state();
-  }
-  std::vector<JointReading> readings() override {
-    const std::lock_guard lock(mutex_);
-    return simulator_.readings();
-  }
-  void send(const JointPath& path) override {
-    const std::lock_guard lock(mutex_);
-    simulator_.send(path);
-  }
-  bool is_simulated() const override { return true; }
-  std::optional<StampedImage> newest() override {
-    const std::lock_guard lock(mutex_);
-    auto image = simulator_.newest();
-    vision_is_idle_ = !image;  // requesting the next image means that the previous one was reported
-    changed_.notify_all();
-    return image;
-  }
-  double now_s() const override {
-    const std::lock_guard lock(mutex_);
-    return simulator_.now_s();
-  }
-  void sleep_until(double time_s) override {
-    std::unique_lock lock(mutex_);
-    simulator_.sleep_until(time_s);
-    vision_is_idle_ = false;
-    EXPECT_TRUE(changed_.wait_for(lock, hangs, [this] { return vision_is_idle_; }));
-  }
-
- private:
-  Simulator& simulator_;
-  mutable std::mutex mutex_;
-  std::condition_variable changed_;
-  bool vision_is_idle_ = false;
-};
-
-// A camera that shows one image for a while.
-class FreezingImages : public ImageStream {
- public:
-  FreezingImages(Simulator& simulator, const Interval& when, bool new_stamps)
-      : simulator_(simulator), when_(when), new_stamps_(new_stamps) {}
-  std::optional<StampedImage> newest() override {
-    auto image = simulator_.newest();
-    if (!image) return image;
-    if (!kept_ || !when_.contains(image->time_s)) kept_ = image;
-    return StampedImage{new_stamps_ ? image->time_s : kept_->time_s, kept_->bgr};
-  }
-
- private:
-  Simulator& simulator_;
-  Interval when_;
-  bool new_stamps_;
-  std::optional<StampedImage> kept_;
-};
 
 const JointVector start{0.05, 1.57, 0.064, 1.2};
 
@@ -277,16 +203,8 @@ PastRun run_case(const Case& c) {
   if (c.dark) simulator.change_light(*c.dark, 0.01F);
   if (c.endoscope) simulator.move_endoscope(*c.endoscope);
   OperatedArm arm(simulator);
-  Watcher watcher(c, rig, simulator, c.operated ? &arm : nullptr);
-  if (c.frozen) {
-    FreezingImages images(simulator, *c.frozen, c.new_stamps);
-    run(simulator, images, simulator, config, trajectory, c.duration_s, watcher);
-  } else if (c.thread == TrackingThread::own) {
-    InStep in_step(simulator);
-    run(in_step, in_step, in_step, config, trajectory, c.duration_s, watcher);
-  } else {
-    run(arm, simulator, simulator, config, trajectory, c.duration_s, watcher);
-  }
+  Watcher watcher(rig, simulator, c.operated ? &arm : nullptr);
+  run(arm, simulator, simulator, config, trajectory, c.duration_s, watcher);
   return std::move(watcher.done);
 }
 
@@ -311,7 +229,7 @@ void expect_within_limits(const PastRun& done, const ControllerConfig& config) {
 TEST(Run, FollowsThePapersTrajectoryFromARandomStart) {
   for (const std::uint64_t seed : {1, 2}) {
     SCOPED_TRACE(seed);
-    const PastRun done = run_case({seed, 0.08, 8, {}, ControlMode::fused});
+    const PastRun done = run_case({seed, 0.08, 8, ControlMode::fused});
     ASSERT_TRUE(done.convergence.reached_s());
     EXPECT_LE(*done.convergence.reached_s(), 5);
     Eigen::Vector4d squares = Eigen::Vector4d::Zero(), sum = squares;
@@ -335,7 +253,7 @@ TEST(Run, IsNotSilentlyWrongWhereTheRigIs) {
   const auto last_of = [&](const Rig& believed) {
     const Case c;
     Simulator simulator(rig, {}, start);
-    Watcher watcher(c, rig, simulator);
+    Watcher watcher(rig, simulator);
     run(simulator, simulator, simulator, config_of(believed, c), small_trajectory(), 1, watcher);
     return watcher.done.records.back().decision;
   };
@@ -354,29 +272,6 @@ TEST(Run, IsNotSilentlyWrongWhereTheRigIs) {
     other_lens.camera.fx_px *= times, other_lens.camera.fy_px *= times;
     const ServoDecision last = last_of(other_lens);
     EXPECT_TRUE(last.registration_contradicted || last.control.action == ControlAction::hold) << times;
-  }
-}
-
-// Held within 100 ms of the first image that repeats, and no farther away then than braking takes it; then on again.
-TEST(Run, HoldsWhenThePictureFreezesWhateverItsStamps) {
-  for (const bool new_stamps : {true, false}) {
-    SCOPED_TRACE(new_stamps ? "new stamps" : "the same stamp");
-    Case c;
-    c.frozen = Interval{4, 5.5};
-    c.new_stamps = new_stamps;
-    const PastRun done = run_case(c);
-    const ControllerConfig controller = config_of(testing::small_test_rig(), c).controller;
-    for (const Record& record : done.records) {
-      const double since_s = record.input.time_s - 4, before_s = record.input.time_s - 5.5;
-      if (since_s < 0.1 + 2 * controller.period_s || before_s > -2 * controller.period_s) continue;
-      EXPECT_EQ(record.decision.control.action, ControlAction::hold) << record.input.time_s;
-      EXPECT_EQ(record.decision.control.reason, new_stamps ? HoldReason::frozen_image : HoldReason::stale_image)
-          << record.input.time_s;
-    }
-    expect_within_limits(done, controller);
-    EXPECT_EQ(done.records.back().decision.control.action, ControlAction::track);
-    EXPECT_LT(done.last_px(), 1);
-    EXPECT_EQ(done.records.back().decision.registration, 0);
   }
 }
 
@@ -517,22 +412,6 @@ TEST(Run, GoesOnAfterStartWhereTheEndoscopeMoved) {
     c.duration_s = 14;
     c.endoscope = random_motion(rig, duration_s, random);
     expect_measured_anew(rig, c);
-  }
-}
-
-TEST(Run, HoldsForGoodWhereNobodyMovesTheArmAfterTheEndoscopeMoved) {
-  const Rig rig = testing::small_test_rig();
-  Random random(1);
-  Case c;
-  c.operated = false;
-  c.duration_s = endoscope_moves_s + 3;
-  c.endoscope = random_motion(rig, 0, random);
-  const PastRun done = run_case(c);
-  expect_nothing_until_start(done);
-  for (const Record& record : done.records) {
-    if (record.input.time_s > endoscope_moves_s + 0.1) {
-      EXPECT_EQ(record.decision.control.reason, HoldReason::endoscope_moved) << record.input.time_s;
-    }
   }
 }
 
@@ -757,25 +636,6 @@ TEST(Run, DoesNotHoldAnEndoscopeThatRests) {
   EXPECT_LE(held, 0.005 * ticks);
 }
 
-// From the fault until the start no joint moves, though the arm recovers in between.
-TEST(Run, AfterAnArmFaultItHoldsUntilAStart) {
-  Case c;
-  c.faulted = Interval{3, 3.5};
-  c.start_s = 5;
-  const PastRun done = run_case(c);
-  constexpr std::size_t held = 181, started = 301;
-  for (std::size_t k = held; k < done.records.size(); ++k) {
-    const ServoDecision& decision = done.records[k].decision;
-    EXPECT_EQ(decision.control.reason == HoldReason::arm_not_enabled, k < started) << k;
-    EXPECT_EQ(decision.send, k >= started) << k;
-    const Eigen::Vector4d q = done.records[k].input.joints.q.vector() - done.records[held + 6].input.joints.q.vector();
-    if (k < held + 6 || k > started) continue;
-    EXPECT_TRUE((q.array().abs() < Eigen::Array4d(1e-4, 1e-4, 5e-5, 1e-4)).all()) << k << ": " << q.transpose();
-  }
-  expect_within_limits(done, config_of(testing::small_test_rig(), c).controller);
-  EXPECT_LT(done.last_px(), 1);
-}
-
 // The same seed gives the same run, and the log is enough to decide everything again.
 TEST(Run, RepeatsAndReplaysBitForBit) {
   for (const ControlMode mode : {ControlMode::fused, ControlMode::paper}) {
@@ -793,19 +653,6 @@ TEST(Run, RepeatsAndReplaysBitForBit) {
     ticks[70].input.desired.features[1] += 1e-9;
     EXPECT_TRUE(replay(ticks, config.rig, config.controller));
   }
-}
-
-// Only where the tracking is done differs.
-TEST(Run, ConvergesAsWellWhenItTracksInItsOwnThread) {
-  Case c;
-  c.duration_s = 4;
-  const PastRun callers = run_case(c);
-  c.thread = TrackingThread::own;
-  const PastRun own = run_case(c);
-  ASSERT_EQ(own.records.size(), callers.records.size());
-  for (std::size_t i = 0; i < own.records.size(); ++i)
-    ASSERT_EQ(decision_fields(own.records[i].decision), decision_fields(callers.records[i].decision)) << i;
-  EXPECT_TRUE(is_right(own, own.records.size() - 1, 1));
 }
 
 // Vision that is at its first image until somebody ends it.
@@ -911,7 +758,7 @@ TEST(Run, NeedsTheLimitsOfAnArmThatIsNotSimulated) {
   const Rig rig = testing::small_test_rig();
   Simulator simulator(rig, {}, start);
   Real arm(simulator);
-  Watcher watcher({}, rig, simulator);
+  Watcher watcher(rig, simulator);
   RunConfig config = config_of(rig, {});
   const auto complaint = [&] {
     return testing::input_error([&] { run(arm, simulator, simulator, config, small_trajectory(), 0.1, watcher); });
@@ -954,7 +801,7 @@ std::string wrong_rig_of(const Misread& misread) {
   config.controller.limits.lower.setConstant(-7), config.controller.limits.upper.setConstant(7);
   Simulator simulator(rig, {}, std::make_unique<MisreadArm>(misread.sign, misread.offset, start.vector()));
   OperatedArm arm(simulator);
-  Watcher watcher({}, rig, simulator, &arm);
+  Watcher watcher(rig, simulator, &arm);
   run(arm, simulator, simulator, config, small_trajectory(), misread.duration_s, watcher);
   std::string last;
   for (const Record& record : watcher.done.records) {
@@ -1051,7 +898,7 @@ std::string refusal_of(const Refused& refused) {
   const Eigen::Vector4d before = simulator.measured_jp();
   AheadArm arm(simulator, refused.joints_ahead_s, refused.homing_s);
   OtherClock others(simulator, refused.images_ahead_s, refused.clock_in_order);
-  Watcher watcher(c, rig, simulator);
+  Watcher watcher(rig, simulator);
   const std::string said =
       testing::input_error([&] { run(arm, others, others, config, refused.trajectory, refused.duration_s, watcher); });
   EXPECT_TRUE(said.empty() || simulator.measured_jp() == before) << said;
@@ -1083,70 +930,6 @@ TEST(Run, RefusesFeaturesThatNoImageShowsInEveryMode) {
       refused.trajectory = {0, [f](double) { return DesiredFeatures{f}; }};
       EXPECT_EQ(refusal_of(refused), complaint) << to_string(refused.mode) << refused.registered << f.transpose();
     }
-}
-
-TEST(Run, RefusesGoalsOfTheTipOutOfReach) {
-  const auto at = [](double x_m, double y_m, double z_m) {
-    return refusal_of({.trajectory = {0, {}, [=](double) { return TipGoal{{x_m, y_m, z_m}}; }}});
-  };
-  EXPECT_NE(at(0, 0, -0.1).find("it lies behind the camera; the nearest that can be reached is "), std::string::npos);
-  EXPECT_NE(at(0.3, 0, 0.3).find("; the nearest that can be reached is "), std::string::npos);
-  EXPECT_NE(at(NAN, 0, 0.1).find("its place is not finite"), std::string::npos);
-  Refused unregistered{.trajectory = tip_set_point({{0.01, 0.01, 0.12}}, ""), .mode = ControlMode::uncalibrated};
-  unregistered.registered = false;
-  EXPECT_NE(refusal_of(unregistered).find("needs the rig's camera_from_rcm"), std::string::npos);
-}
-
-// As renderings show it: 5 mm at 5 mm/s, the registration off by 1 mm and 5 mrad, as its sigmas say; play in the arm.
-TEST(Run, TheTipDrawsACircleOnItsGoal) {
-  static constexpr double radius_m = 5e-3, speed_m_s = 5e-3, settled_s = 3, duration_s = 10;
-  Rig scene = testing::small_test_rig();
-  Instrument& instrument = scene.instruments[0];
-  const Eigen::Vector3d tip_in_marker_m(0, 0, 0.045);
-  instrument.tool.emplace().place.emplace().base_in_marker_m = tip_in_marker_m;
-  Rig rig = scene;
-  rig.instruments[0].camera_from_rcm->translation += Eigen::Vector3d(0.6, -0.6, 0.5) * 1e-3;
-  rig.instruments[0].camera_from_rcm->rotation =
-      rotation_by(Eigen::Vector3d(3, 3, -2.6) * 1e-3) * rig.instruments[0].camera_from_rcm->rotation;
-  Eigen::Vector<double, 6> sigma;
-  sigma << Eigen::Vector3d::Constant(6e-4), Eigen::Vector3d::Constant(3e-3);
-  rig.instruments[0].registration_covariance = sigma.cwiseAbs2().asDiagonal();
-  const SimulatorConfig simulated;
-  Simulator simulator(scene, simulated, start);
-  const auto true_tip_m = [&] {
-    return Eigen::Vector3d(camera_from_marker(instrument.marker, *instrument.camera_from_rcm, simulator.true_q()) *
-                           tip_in_marker_m);
-  };
-  const auto goal_m = [centre_m = true_tip_m()](double time_s) -> Eigen::Vector3d {
-    const double turn_rad = speed_m_s / radius_m * time_s;
-    return centre_m + radius_m * Eigen::Vector3d(std::cos(turn_rad) - 1, std::sin(turn_rad), 0);
-  };
-  const Case c;
-  struct : RunObserver {
-    std::function<void(const ControlTick&)> see;
-    PastRun done;
-    bool on_tick(const ControlTick& tick) override {
-      see(tick);
-      done.records.push_back({tick.input, tick.decision, {}});
-      return true;
-    }
-  } observer;
-  double squares_m2 = 0, squares_px2 = 0;
-  int count = 0;
-  observer.see = [&](const ControlTick& tick) {
-    if (tick.input.time_s < settled_s) return;
-    EXPECT_EQ(tick.decision.control.reason, HoldReason::none) << tick.input.time_s;
-    const Eigen::Vector3d wanted_m = goal_m(tick.input.time_s), off_m = true_tip_m() - wanted_m;
-    squares_m2 += off_m.cross(wanted_m.normalized()).squaredNorm();
-    squares_px2 += (rig.camera.ideal_from_point(true_tip_m()) - rig.camera.ideal_from_point(wanted_m)).squaredNorm();
-    ++count;
-  };
-  const Trajectory circle{0, {}, [&](double time_s) { return TipGoal{goal_m(time_s)}; }};
-  run(simulator, simulator, simulator, config_of(rig, c), circle, duration_s, observer);
-  RecordProperty("rms_mm", std::to_string(1e3 * std::sqrt(squares_m2 / count)));
-  EXPECT_LE(std::sqrt(squares_m2 / count), 0.15e-3);
-  EXPECT_LE(std::sqrt(squares_px2 / count), 0.5);
-  EXPECT_FALSE(replay(logged(observer.done), rig, config_of(rig, c).controller));
 }
 
 TEST(Run, RefusesOtherClocksThanTheLoops) {
