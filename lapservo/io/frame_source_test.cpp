@@ -57,18 +57,6 @@ TEST(VideoReader, IsPatientOnceItIsOpen) {
   EXPECT_EQ(reader.complaint(), "");
 }
 
-TEST(FolderSource, OrdersNumbersInNamesByValue) {
-  const testing::TemporaryFolder folder;
-  for (const int number : {10, 9, 100, 1, 0}) {
-    cv::Mat picture(16, 16, CV_8UC3, cv::Scalar::all(number));
-    write_image(folder / ("frame" + std::to_string(number) + ".png"), picture);
-  }
-  const auto source = open_frame_source(folder.path().string(), 30);
-  std::vector<int> order;
-  while (const auto frame = source->next()) order.push_back(frame->bgr.at<cv::Vec3b>(0, 0)[0]);
-  EXPECT_EQ(order, (std::vector<int>{0, 1, 9, 10, 100}));
-}
-
 TEST(FolderSource, SaysWhatItLeavesOut) {
   const testing::TemporaryFolder folder;
   testing::write_file(folder / "b.HEIC", "");

@@ -103,18 +103,6 @@ TEST(Overlay, LabelsStandBesideTheMarker) {
   }
 }
 
-TEST(Overlay, LinesOfALabelStandApartInASmallImage) {
-  Rig rig = testing::paper_test_rig();
-  rig.camera.width_px /= 3, rig.camera.height_px /= 3;
-  rig.camera.fx_px /= 3, rig.camera.fy_px /= 3, rig.camera.cx_px /= 3, rig.camera.cy_px /= 3;
-  const cv::Mat overlay = draw_overlay(grey_frame(rig), rig, {seen_at(rig)});
-  cv::Mat backed;
-  cv::inRange(overlay, cv::Scalar::all(30), cv::Scalar::all(34), backed);
-  int rows = 0;
-  for (int v = 0; v < backed.rows; ++v) rows += 4 * cv::countNonZero(backed.row(v)) > backed.cols;
-  EXPECT_GT(rows, 40) << "once darkened: two lines of 12 px each, padded, and none over another";
-}
-
 // With the status, and in another style than an accepted measurement.
 TEST(Overlay, DrawsWhatWasRefused) {
   const Rig rig = testing::paper_test_rig();

@@ -119,28 +119,19 @@ std::vector<std::string> empty_columns(const CsvTable& table) {
   return empty;
 }
 
-TEST(ObservationCsv, WithoutARegistrationTheRcmsColumnsAreEmpty) {
+TEST(ObservationCsv, ColumnsOfWhatIsNotThereAreEmpty) {
   Random random(seed);
-  Observation o = random_observation(random);
-  o.rcm.reset(), o.features.r_px.reset();
-  EXPECT_EQ(empty_columns(table_of(o)),
+  Observation unregistered = random_observation(random), without_pose = unregistered, without_tip = unregistered;
+  unregistered.rcm.reset(), unregistered.features.r_px.reset();
+  without_pose.marker.reset();
+  without_tip.tip.reset();
+  EXPECT_EQ(empty_columns(table_of(unregistered)),
             (std::vector<std::string>{"theta_rad", "phi_rad", "rho_m", "psi_rad", "sigma_theta_rad", "sigma_phi_rad",
                                       "sigma_rho_m", "sigma_psi_rad", "r_px", "p_false"}));
-}
-
-TEST(ObservationCsv, WithoutAPoseTheMarkersColumnsAreEmpty) {
-  Random random(seed);
-  Observation o = random_observation(random);
-  o.marker.reset();
-  EXPECT_EQ(empty_columns(table_of(o)).size(), 11U);
-}
-
-TEST(ObservationCsv, WithoutATipItsColumnsAreEmpty) {
-  Random random(seed);
-  Observation o = random_observation(random);
-  o.tip.reset();
-  EXPECT_EQ(empty_columns(table_of(o)), (std::vector<std::string>{"tip_x_m", "tip_y_m", "tip_z_m", "sigma_tip_x_m",
-                                                                  "sigma_tip_y_m", "sigma_tip_z_m"}));
+  EXPECT_EQ(empty_columns(table_of(without_pose)).size(), 11U);
+  EXPECT_EQ(
+      empty_columns(table_of(without_tip)),
+      (std::vector<std::string>{"tip_x_m", "tip_y_m", "tip_z_m", "sigma_tip_x_m", "sigma_tip_y_m", "sigma_tip_z_m"}));
 }
 
 TEST(ObservationCsv, WithoutAnObservationEveryMeasurementIsEmpty) {
