@@ -70,29 +70,6 @@ TEST(BagFrames, LeaveOutWhatIsNoFrameAndSayIt) {
   EXPECT_EQ(frames->complaint(), "/image: 4 of 6 images are left out (no stamp)");
 }
 
-TEST(BagFrames, OfAClockThatIsSetAndOfAStampThatStandsOutAreCountedAndSaid) {
-  std::vector<ImageMessage> ahead, set_back;
-  for (int i = 0; i < 20; ++i) {
-    ahead.push_back(image_at(1000 + 0.1 * i + (i == 5 ? 3600 : 0)));
-    set_back.push_back(image_at(5000 + 0.1 * i - (i < 10 ? 0 : 3600)));
-  }
-  const auto times_of = [](BagFrames& frames) {
-    std::vector<double> times_s;
-    while (const auto frame = frames.next()) times_s.push_back(frame->time_s);
-    return times_s;
-  };
-  const BagOfImages bag_ahead(ahead), bag_set_back(set_back);
-  const auto frames_ahead = bag_ahead.open(), frames_set_back = bag_set_back.open();
-  const auto times_ahead = times_of(*frames_ahead), times_set_back = times_of(*frames_set_back);
-  ASSERT_EQ(times_ahead.size(), 19U);
-  EXPECT_NEAR(times_ahead.back(), 1.9, 1e-6);
-  EXPECT_EQ(frames_ahead->complaint(),
-            "/image: 1 of 20 images are left out (its stamp is 3600.0 s from those around it)");
-  ASSERT_EQ(times_set_back.size(), 20U);
-  for (int i = 0; i < 20; ++i) EXPECT_NEAR(times_set_back[static_cast<std::size_t>(i)], 0.1 * i, 1e-6);
-  EXPECT_EQ(frames_set_back->complaint(), "the clock of /image was set 1 times: times go on by the recorder's");
-}
-
 TEST(BagFrames, WithoutAnyThatCanBeReadAreRefused) {
   const BagOfImages bag({image_at(100, "mono8"), image_at(101, "mono8")});
   const std::string error = input_error([&] { bag.open(); });

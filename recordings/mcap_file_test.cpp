@@ -134,19 +134,6 @@ TEST(McapFile, ThatWasCutGivesItsWholeMessages) {
   }
 }
 
-TEST(McapFile, SaysWhereItWasCut) {
-  const testing::TemporaryFolder folder;
-  testing::write_mcap(folder / "a.mcap", entries(6), {"", 3, false, true});
-  const std::string whole = testing::read_file(folder / "a.mcap");
-  testing::write_file(folder / "a.mcap", whole.substr(0, whole.size() - 60));
-  const std::string remark = open_bag(folder / "a.mcap")->remark();
-  EXPECT_EQ(
-      remark.rfind(
-          "a.mcap was not finished by its recorder: of " + std::to_string(whole.size() - 60) + " bytes the first ", 0),
-      0u)
-      << remark;
-}
-
 TEST(McapFile, WithAnIndexIsReadByTheTimesOfItsMessages) {
   const testing::TemporaryFolder folder;
   auto messages = entries(24);
