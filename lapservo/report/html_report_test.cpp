@@ -101,32 +101,5 @@ TEST(HtmlReport, SaysAtTheTopThatItIsNotWhole) {
   EXPECT_LT(html.find("stopped in the middle"), html.find("class=\"words\"")) << "before the first figure";
 }
 
-TEST(HtmlReport, ColoursTheTitleThatIsAVerdict) {
-  Report report = sample_report();
-  EXPECT_NE(html_from(report).find("<h2>word</h2>"), std::string::npos);
-  report.sections[0].verdict = Verdict::good;
-  EXPECT_NE(html_from(report).find("<h2 class=\"good\">word</h2>"), std::string::npos);
-  report.sections[0].verdict = Verdict::bad;
-  EXPECT_NE(html_from(report).find("<h2 class=\"bad\">word</h2>"), std::string::npos);
-}
-
-TEST(HtmlReport, LinksToThePapersFiguresAndTables) {
-  Report report = sample_report();
-  std::get<Plot>(report.sections[0].figures[0].content).title = "Figure 5: one trial";
-  report.sections[0].tables[0].caption = "Table I: errors";
-  const std::string html = html_from(report);
-  EXPECT_NE(html.find("<a href=\"#one\">Figure 5</a>"), std::string::npos);
-  EXPECT_NE(html.find("<a href=\"#one\">Table I</a>"), std::string::npos);
-}
-
-TEST(HtmlReport, DoesNotBreakValues) {
-  Report report = sample_report();
-  report.sections[0].comparisons = {{"a b", "3.62 \u00b1 2.13 px", "58 mrad, l 2.48, K = 3 /s", "2 positions"}};
-  const std::string html = html_from(report);
-  EXPECT_NE(html.find("3.62\u00a0\u00b1\u00a02.13\u00a0px"), std::string::npos);
-  EXPECT_NE(html.find("58\u00a0mrad, l\u00a02.48, K =\u00a03\u00a0/s"), std::string::npos);
-  EXPECT_NE(html.find("2 positions"), std::string::npos);
-}
-
 }  // namespace
 }  // namespace lapservo::internal
