@@ -113,28 +113,6 @@ TEST(Rig, ReadsEveryResponse) {
   EXPECT_EQ(table.table_value, (std::vector<double>{0, 0.5, 1}));
 }
 
-TEST(Rig, ReadsWhetherFramesAreInterlaced) {
-  const auto deinterlace = [](const std::string& line) {
-    return parse_rig(with("  response", line + "  response"), "rig.yaml").camera.deinterlace;
-  };
-  EXPECT_FALSE(deinterlace(""));
-  EXPECT_TRUE(deinterlace("  deinterlace: true\n"));
-  EXPECT_FALSE(deinterlace("  deinterlace: false\n"));
-}
-
-TEST(Rig, ReadsJointsAndTheImagesDelay) {
-  const Rig rig = parse_rig(with_joints("[yaw, pitch, insertion, roll]", "[1, -1, 1, 1]", "[0, 1.5, -0.0156, 0]") +
-                                "    image_delay_s: 0.08\n    sigma_image_delay_s: 0.001\n",
-                            "rig.yaml");
-  const Instrument& instrument = rig.instruments.front();
-  ASSERT_TRUE(instrument.joints);
-  EXPECT_EQ(instrument.joints->names, (std::array<std::string, 4>{"yaw", "pitch", "insertion", "roll"}));
-  EXPECT_EQ(instrument.joints->sign, (std::array<double, 4>{1, -1, 1, 1}));
-  EXPECT_EQ(instrument.joints->offset, (std::array<double, 4>{0, 1.5, -0.0156, 0}));
-  EXPECT_EQ(instrument.image_delay_s, 0.08);
-  EXPECT_FALSE(parse_rig(good, "rig.yaml").instruments.front().joints);
-}
-
 // Keys that ROS's camera_calibration and calibrate write beside those that a rig needs.
 TEST(Rig, TakesTheOtherKeysOfACameraInfoAndSigmas) {
   EXPECT_EQ(error_of(with("  response", R"(  camera_name: endoscope
@@ -183,26 +161,18 @@ const Complaints missing_keys{
     {with("  camera_matrix: {rows: 3, cols: 3, data: [1100, 0, 639.5, 0, 1090, 359.5, 0, 0, 1]}\n", ""),
      "camera.camera_matrix: is missing, expected a map with 'data'"},
     {with("data: [1100", "values: [1100"), unknown("camera.camera_matrix.values", "cols")},
-    {with("data: [-0.1", "values: [-0.1"), unknown("camera.distortion_coefficients.values", "cols")},
-    {with("- name: PSM1\n    marker", "- marker"), "instruments[0].name: is missing, expected a name"},
-    {with("    marker:", "    band:"), unknown("instruments[0].band", "name")},
     {with("      diameter_m: 0.0084\n", ""), marker + "diameter_m: is missing, " + diameter},
     {with("      bands_upper_m: [0.0035, 0.0036, 0.0169]\n", ""),
      marker + "bands_upper_m: is missing, expected three lengths in metres"},
     {with("      translation_m: [-0.0778, 0.0672, 0.0592]\n", ""),
      from_rcm + "translation_m: is missing, expected x y z in metres"},
-    {with("      quaternion_xyzw: [0, 0, 0.6, 0.8]\n", ""),
-     from_rcm + "quaternion_xyzw: is missing, expected x y z w of a unit quaternion"},
 };
 
 const Complaints wrong_types{
-    {"[1, 2]", "file: is a list of 2, expected a map with 'camera'"},
     {"rig", "file: is rig, expected a map with 'camera'"},
     {"camera: [1]\n", "camera: is a list of 1, expected a map with 'image_width'"},
     {with("1280", "wide"), "camera.image_width: is wide, " + pixels},
-    {with("1280", "{px: 1280}"), "camera.image_width: is a map, " + pixels},
     {with("1280", "1280px"), "camera.image_width: is 1280px, " + pixels},
-    {with("1280", "''"), "camera.image_width: is '', " + pixels},
     {with("  response", "  deinterlace: 1\n  response"), "camera.deinterlace: is 1, expected true or false"},
     {with("639.5", "centre"), "camera.camera_matrix.data[2]: is centre, " + finite},
     {with("0, 0, 1]}", "0, 0]}"),
@@ -214,15 +184,11 @@ const Complaints wrong_types{
      "camera.distortion_coefficients.data: is a list of 8, expected k4 k5 k6 of 0: a rational lens is not modelled "
      "(lapservo calibrate camera fits plumb_bob)"},
     {with("gamma:2.2", "log"), "camera.response: is log, " + response},
-    {with("gamma:2.2", "[srgb]"), "camera.response: is a list of 1, " + response},
     {with("  - name: PSM1\n    marker:", "  PSM1:\n    marker:"),
      "instruments: is a map, expected a list of instruments"},
-    {with("PSM1", "[PSM1]"), "instruments[0].name: is a list of 1, expected a name"},
     {with("[90, 180, 270]", "90"), marker + "hues_deg: is 90, expected three hues in degrees"},
     {with("[0.0035, 0.0036, 0.0169]", "[0.0035, 0.0205]"),
      marker + "bands_upper_m: is a list of 2, expected three lengths in metres"},
-    {with("[0.0095, 0.0094, 0.0051]", "[0.0095, 0.0094, 0.0051, 0]"),
-     marker + "bands_lower_m: is a list of 4, expected three lengths in metres"},
     {with("0.25", "left"), marker + "seam_rad: is left, expected an angle in radians"},
     {good.substr(0, good.find("    camera_from_rcm")) + "    camera_from_rcm: 3\n",
      "instruments[0].camera_from_rcm: is 3, expected a map with 'translation_m'"},
@@ -231,25 +197,17 @@ const Complaints wrong_types{
 const Complaints non_finite_numbers{
     {with("1280", ".nan"), "camera.image_width: is .nan, " + pixels},
     {with("[1100", "[.inf"), "camera.camera_matrix.data[0]: is .inf, " + finite},
-    {with("[1100", "[1e999"), "camera.camera_matrix.data[0]: is 1e999, " + finite},
     {with("[-0.1", "[nan"), "camera.distortion_coefficients.data[0]: is nan, " + finite},
     {with("gamma:2.2", "gamma:nan"), "camera.response: is gamma:nan, " + response},
     {with("0.0084", "inf"), marker + "diameter_m: is inf, " + diameter},
-    {with("180", "NaN"), marker + "hues_deg[1]: is NaN, " + finite},
-    {with("0.0036", "nan"), marker + "bands_upper_m[1]: is nan, " + finite},
-    {with("0.25", "-.inf"), marker + "seam_rad: is -.inf, expected an angle in radians"},
     {with("0.0672", "nan"), from_rcm + "translation_m[1]: is nan, expected a length within 10 m"},
-    {with("0.6", "inf"), from_rcm + "quaternion_xyzw[2]: is inf, " + finite},
 };
 
 const Complaints impossible_cameras{
     {with("1280", "0"), "camera.image_width: is 0, " + pixels},
-    {with("1280", "1280.5"), "camera.image_width: is 1280.5, " + pixels},
     {with("720", "1e6"), "camera.image_height: is 1e6, " + pixels},
-    {with("720", "-720"), "camera.image_height: is -720, " + pixels},
     {with("plumb_bob", "equidistant"),
      "camera.distortion_model: is equidistant, expected plumb_bob, which lapservo calibrate camera fits"},
-    {with("[1100", "[-1100"), "camera.camera_matrix.data: is -1100 0 639.5 0 1090 359.5 0 0 1" + matrix},
     {with("[1100", "[4.2"), "camera.camera_matrix.data: is 4.2 0 639.5 0 1090 359.5 0 0 1" + matrix},
     {with("1090", "1e7"), "camera.camera_matrix.data: is 1100 0 639.5 0 1e+07 359.5 0 0 1" + matrix},
     {with("[1100, 0,", "[1100, 2,"), "camera.camera_matrix.data: is 1100 2 639.5 0 1090 359.5 0 0 1" + matrix},
@@ -261,11 +219,7 @@ const Complaints impossible_cameras{
 
 // Some rigs with an invalid marker; MarkerProblem tests the rest.
 const Complaints impossible_instruments{
-    {with("0.0084", "8.4"), marker + "diameter_m: is 8.4, " + diameter},
     {with("0.0001", "-0.0001"), marker + "tolerance_m: is -0.0001, expected 0 to 0.005 (metres)"},
-    {with("[0.0095, 0.0094, 0.0051]", "[9.5, 9.4, 5.1]"),
-     marker + "bands_lower_m[0]: is 9.5, expected a length above 0, up to 0.5 (metres)"},
-    {with("0.25", "3600"), marker + "seam_rad: is 3600, expected an angle in radians"},
     {with("[0.0095, 0.0094, 0.0051]", "[0.0035, 0.0036, 0.0169]"),
      "instruments[0].marker: " + not_decodable +
          "the cross-ratio is the same at every rotation: the inner boundaries must slope"},
@@ -273,7 +227,6 @@ const Complaints impossible_instruments{
      "instruments[0].marker: " + not_decodable +
          "the cross-ratio turns back near tau = 3.25 rad, so that two rotations look the same"},
     {with("0.0672", "67.2"), from_rcm + "translation_m[1]: is 67.2, expected a length within 10 m"},
-    {with("[0, 0, 0.6, 0.8]", "[0, 0, 0.6, 0.9]"), from_rcm + "quaternion_xyzw: is of norm 1.081665, " + quaternion},
     {with("[0, 0, 0.6, 0.8]", "[0, 0, 0, 0]"), from_rcm + "quaternion_xyzw: is of norm 0.000000, " + quaternion},
     {with("PSM1", "'PSM,1'"), "instruments[0].name: is PSM,1, expected a name without commas and control characters"},
     {with("PSM1", R"("PSM\n1")"),
@@ -282,16 +235,12 @@ const Complaints impossible_instruments{
 
 // Keys that would be ignored or misread; more of them in the tests of KnownKeys.
 const Complaints misunderstandings{
-    {with("seam_rad", "seem_rad"), unknown(marker + "seem_rad", "seam_rad")},
-    {with("response", "respons"), unknown("camera.respons", "response")},
     {with("camera_from_rcm", "camera_from_rmc"), unknown("instruments[0].camera_from_rmc", "camera_from_rcm")},
-    {with("quaternion_xyzw", "quaternion_wxyz"), unknown(from_rcm + "quaternion_wxyz", "quaternion_xyzw")},
     {good + "instrument: []\n", unknown("instrument", "instruments")},
     {good + "---\n" + good,
      "holds several documents, expected one: no line of three dashes in the midst of a rig file"},
     {with("[0, 0, 0.6, 0.8]", "[0, 0, 0.6, 0.79]"), from_rcm + "quaternion_xyzw: is of norm 0.992018, " + quaternion},
     {with("rows: 3", "rows: 2"), "camera.camera_matrix.rows: is 2, expected 3"},
-    {with("cols: 5", "cols: 4"), "camera.distortion_coefficients.cols: is 4, expected 5"},
     {with("  response", "  binning_x: 2\n  response"),
      "camera.binning_x: is 2, expected 0 or 1: a camera_matrix of the pixels as they are"},
     {with("  response", "  roi: {x_offset: 8}\n  response"),
@@ -309,8 +258,6 @@ const Complaints misunderstandings{
      "belong to"},
     {with("0, 0, 1]}", "0, 0, 1], sigma_data: [0, 0, 0, 0, 0, 0, 0, 0, 0]}"),
      unknown("camera.camera_matrix.sigma_data", "data")},
-    {with("gamma:2.2", "{light: [0, 0.5], value: [0, 1]}"),
-     "camera.response.light: is a list of 2, expected 2 to 4096 numbers that rise from 0 to 1"},
 };
 
 const std::string names = "[yaw, pitch, insertion, roll]", sign = "[1, -1, 1, 1]", offset = "[0, 1.5, -0.0156, 0]";
