@@ -11,7 +11,6 @@
 #include "lapservo/experiments/positions.h"
 #include "lapservo/experiments/rcm.h"
 #include "lapservo/experiments/rotation.h"
-#include "lapservo/experiments/stage.h"
 #include "lapservo/experiments/tracking.h"
 #include "lapservo/kinematics/visibility.h"
 #include "lapservo/rig/single_instrument.h"
@@ -157,22 +156,6 @@ TEST(Illumination, TakesTheLargestOfFour) {
   ASSERT_EQ(of_method.largest.size(), 7U);
   EXPECT_NEAR(of_method.largest[0].px, 0.3, 1e-12);
   EXPECT_NEAR(of_method.of_largest.mean, (4 * 0.3 + 3 * 1.3) / 7, 1e-12);
-}
-
-// A part of the light does not come from the lamps.
-TEST(Stage, TurnedDownLampsLeaveTheAmbientPart) {
-  const Rig rig = testing::small_test_rig();
-  Random random(seed);
-  const JointVector q = spread_positions(rig, 1, random)[0];
-  const cv::Mat tissue(rig.camera.height_px, rig.camera.width_px, CV_32FC3, cv::Scalar::all(0.9));
-  Stage stage(rig, tissue);
-  const cv::Mat full = stage.render(q, 1, 1), dim = stage.render(q, 0.4, 1);
-  const auto light = [&](const cv::Mat& frame) {
-    const double value = frame.at<cv::Vec3b>(5, frame.cols - 5)[1] / 255.0;
-    return rig.camera.response.light_from_value(value);
-  };
-  const double fraction = Stage::ambient_fraction + 0.4 * (1 - Stage::ambient_fraction);
-  EXPECT_NEAR(light(dim) / light(full), fraction, 0.03);
 }
 
 // Errors drawn from the covariance that is stated have unit spread in its units, however oblong it is.

@@ -24,19 +24,6 @@ TEST(Spread, OfKnownNumbers) {
   EXPECT_EQ(spread_of({3}).deviation, 0);
 }
 
-// A shift moves mean and median, a scale scales everything; the order does not count.
-TEST(Spread, FollowsShiftAndScale) {
-  Random random(seed);
-  std::vector<double> values, changed;
-  for (int i = 0; i < 101; ++i) values.push_back(random.normal());
-  for (auto value = values.rbegin(); value != values.rend(); ++value) changed.push_back(-3 * *value + 10);
-  const Spread a = spread_of(values), b = spread_of(changed);
-  EXPECT_NEAR(b.mean, 10 - 3 * a.mean, 1e-12) << "seed " << seed;
-  EXPECT_NEAR(b.median, 10 - 3 * a.median, 1e-12);
-  EXPECT_NEAR(b.deviation, 3 * a.deviation, 1e-12);
-  EXPECT_NEAR(b.rms * b.rms, b.mean * b.mean + b.deviation * b.deviation * 100 / 101, 1e-9);
-}
-
 // The mean distance of four points with noise sigma in u and v to their centroid is sigma sqrt(3/4) sqrt(pi/2).
 TEST(DistancesToCentroid, MeasureTheNoiseWhereverThePointsAre) {
   Random random(seed);
