@@ -780,31 +780,6 @@ TEST(SurfaceTracker, FindsInstrumentsThatCross) {
   EXPECT_GE(found, 0.9 * tell);
 }
 
-// A part that the other instrument hides is no boundary that lies elsewhere.
-TEST(SurfaceTracker, FollowsInstrumentsThatCross) {
-  const Rig rig = scenes::usual_rig(2);
-  Random random(4);
-  for (int i = 0; i < 3; ++i) {
-    scenes::CrossingPair pair = scenes::crossing_pair(rig, random);
-    while (std::max(pair.hidden[0], pair.hidden[1]) < 0.1 || std::max(pair.hidden_inner[0], pair.hidden_inner[1]) > 0.4)
-      pair = scenes::crossing_pair(rig, random);
-    Tracker tracker(rig);
-    constexpr int frames = 12, until_found = 6;
-    for (int frame = 0; frame < frames; ++frame) {
-      SCOPED_TRACE("seed 4, pair " + std::to_string(i) + ", frame " + std::to_string(frame));
-      for (JointVector& q : pair.q) q.psi_rad += 0.02, q.rho_m += 0.1e-3;
-      const auto& observations = tracker.track(scenes::render(rig, pair.q, static_cast<std::uint64_t>(frame)));
-      for (std::size_t k = 0; k < 2; ++k) {
-        if (frame >= until_found) {
-          EXPECT_EQ(to_string(observations[k].status), "ok") << k;
-        }
-        if (observations[k].status != Status::ok) continue;
-        EXPECT_LT(std::abs(wrap_pi(observations[k].rcm.value().q.psi_rad - pair.q[k].psi_rad)), 0.03) << k;
-      }
-    }
-  }
-}
-
 // A rig whose instrument comes along the image's lower or right border, and the planes through the camera and it.
 struct BesideBorder {
   Rig rig = scenes::usual_rig();
@@ -855,29 +830,6 @@ TEST(SurfaceTracker, FindsAShaftThatIsHalfOutOfTheFrame) {
   EXPECT_GE(found, 0.95 * all);
   EXPECT_LT(std::sqrt(squares / found - sum * sum / found / found), 0.006);
   EXPECT_LT(std::sqrt(normalised / found), 1.5);
-}
-
-TEST(SurfaceTracker, LateralChromaticAberrationOfTheRigIsUndone) {
-  constexpr ChromaticAberration aberration{0.9975, 1.0025};
-  std::vector<double> known_rad, unknown_rad, blind_rad;
-  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
-    const auto& shot = usual_shot(seed);
-    const cv::Mat seen = scenes::render_aberrated(shot.rig, shot.q, seed, aberration);
-    Rig rig = shot.rig;
-    const auto error_rad = [&] {
-      const Observation o = Tracker(rig).track(seen)[0];
-      return o.status == Status::ok ? std::abs(wrap_pi(o.rcm.value().q.psi_rad - shot.q.psi_rad)) : HUGE_VAL;
-    };
-    unknown_rad.push_back(error_rad());
-    rig.camera.chromatic_aberration = aberration;
-    known_rad.push_back(error_rad());
-    const scenes::Sight sight(shot.rig, seen);
-    const FineFit blind = fit_finely(sight.scene(), sight.light(), shot.truth(true), {}, {.ask = false});
-    blind_rad.push_back(std::abs(wrap_pi(scenes::q_of(shot.rig, blind.unknowns).psi_rad - shot.q.psi_rad)));
-  }
-  for (const double error : known_rad) EXPECT_LT(error, 0.003);
-  for (const double error : unknown_rad) EXPECT_LT(error, 0.003) << "seen by what it does to the boundaries";
-  EXPECT_GT(*std::max_element(blind_rad.begin(), blind_rad.end()), 0.003) << "the test's own power";
 }
 
 }  // namespace
