@@ -195,22 +195,6 @@ TEST(Ros2Transport, PeersWhoseQualityOfServiceDoesNotFitAreSaid) {
       "it read best effort\n");
 }
 
-// Each reliability and durability that a publisher may offer is heard, once.
-TEST(Ros2Transport, EveryPublisherOfOperatingStatesMatches) {
-  for (const Delivery delivery : {Delivery::reliable, Delivery::best_effort, Delivery::latched}) {
-    Ros2Transport to("to");
-    DdsNode from("from", test_domain());
-    TestInbox<OperatingStateMessage> states;
-    const auto subscription = to.subscribe_operating_state("/PSM1/operating_state", states.handler());
-    const dds_entity_t writer =
-        from.create_writer("/PSM1/operating_state", Wire<OperatingStateMessage>::descriptor(), delivery);
-    const auto state = states.get([&] {
-      Wire<OperatingStateMessage>::write(writer, {stamp_s, "PAUSED", true, false});
-    });
-    EXPECT_EQ(state.state, "PAUSED") << static_cast<int>(delivery);
-  }
-}
-
 TEST(Ros2Transport, AStateThatWasSaidOnceByAVolatilePublisherIsMissed) {
   ::testing::internal::CaptureStderr();
   Ros2Transport to("to");

@@ -16,7 +16,6 @@
 
 #include "lapservo/testing/fast_cdr.h"
 #include "lapservo/testing/sample_frames.h"
-#include "transports/ros2/cdr_decoder.h"
 #include "transports/ros2/dds_node.h"
 #include "transports/ros2/ros2_names.h"
 #include "transports/ros2/wire.h"
@@ -209,17 +208,6 @@ TEST(WireBytes, OfWhatTheLoopTells) {
   expect_fields(sent_as("lapservo_msgs/Observation", seen),
                 "instrument PSM1, status ok, q[2] 3, q[3] nan, q_covariance[15] 4, features[0] 5, "
                 "feature_covariance[1] 6, edges_px[7] 7, action track, reason , error[3] 11");
-}
-
-// Bags hold these bytes.
-TEST(WireBytes, AreReadAsBagsAre) {
-  const JointMessage joints{stamp_s, {"yaw", "", "pitch"}, {0.25, -1.5, 3}};
-  const auto bytes = sent(joints);
-  const auto read = decode_cdr<JointMessage>({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()});
-  ASSERT_TRUE(read);
-  EXPECT_EQ(read->stamp_s, joints.stamp_s);
-  EXPECT_EQ(read->names, joints.names);
-  EXPECT_EQ(read->positions, joints.positions);
 }
 
 }  // namespace wire_bytes_test
