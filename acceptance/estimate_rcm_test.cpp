@@ -1,6 +1,5 @@
 // `lapservo estimate-rcm` as its user meets it, and the accuracy promised for it.
 
-#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <sstream>
@@ -120,45 +119,6 @@ TEST_F(EstimateRcm, ExitsWithOneWhenThereIsNone) {
   expect_in(output(), "too_few_lines");
   EXPECT_EQ(run("estimate-rcm " + write("parallel.csv", header + one + beside)), 1);
   expect_in(output(), "parallel");
-}
-
-TEST_F(EstimateRcm, RepeatedRowsAndVeryManyOfThem) {
-  constexpr std::uint64_t seed = 84;
-  Random random(seed);
-  const Camera camera = load_rig("configs/paper.yaml").camera;
-  const std::string rows = observed_lines(camera, "PSM1", {-300, 900}, 0.5, random);
-  std::string often = header, many = header;
-  for (int i = 0; i < 100; ++i) often += rows;
-  for (int i = 0; i < 96000 / 20; ++i) many += observed_lines(camera, "PSM1", {-300, 900}, 0.5, random);
-  expect_done("estimate-rcm " + write("once.csv", header + rows) + " --out a.csv");
-  expect_done("estimate-rcm " + write("often.csv", often) + " --out b.csv");
-  expect_in(errors(), "2000 rows of 20 positions");
-  const CsvTable once = CsvTable::read("a.csv"), repeated = CsvTable::read("b.csv");
-  for (std::size_t method = 0; method < 2; ++method)
-    EXPECT_NEAR(repeated.number(method, "sigma_u_px") / once.number(method, "sigma_u_px"), 1, 1e-3);
-  const auto start = std::chrono::steady_clock::now();
-  expect_done("estimate-rcm " + write("many.csv", many) + " --out c.csv");
-  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(20));
-  EXPECT_NEAR(CsvTable::read("c.csv").number(0, "rcm_u_px"), -300, 2);
-}
-
-TEST_F(EstimateRcm, WarnsOfWhatTheNumbersDoNotTell) {
-  const std::string one = "0,PSM1,ok,100,100,300,100\n";
-  EXPECT_EQ(run("estimate-rcm " + write("narrow.csv", header + one + "1,PSM1,ok,100,200,300,205\n")), 0);
-  expect_in(errors(), "nearly parallel");
-  expect_in(output(), "sigma unknown");
-  constexpr std::uint64_t seed = 83;
-  Random random(seed);
-  const Camera camera = load_rig("configs/paper.yaml").camera;
-  EXPECT_EQ(run("estimate-rcm " + write("exact.csv", header + observed_lines(camera, "PSM1", {-300, 900}, 0, random))),
-            0);
-  expect_in(errors(), "camera_from_rcm");
-  expect_done("estimate-rcm --sigma-px 0.001 --out rcm.csv " +
-              write("noisy.csv", header + observed_lines(camera, "PSM1", {-300, 900}, 1, random)));
-  expect_in(output(), "times their own sigmas, which are too small");
-  const CsvTable report = CsvTable::read("rcm.csv");
-  EXPECT_NEAR(report.number(0, "rcm_u_px"), -300, 4 * report.number(0, "sigma_u_px"));
-  EXPECT_NEAR(report.number(0, "rcm_v_px"), 900, 4 * report.number(0, "sigma_v_px"));
 }
 
 TEST_F(EstimateRcm, RefusesBadInput) {
