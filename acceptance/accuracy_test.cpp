@@ -13,7 +13,6 @@
 #include "lapservo/io/image_file.h"
 #include "lapservo/io/pictures/jpeg_encoding.h"
 #include "lapservo/kinematics/features.h"
-#include "lapservo/sim/tissue.h"
 
 namespace lapservo::acceptance {
 using namespace internal;
@@ -207,14 +206,6 @@ int seen_with_a_wrong_registration(const std::vector<TrueFrame>& frames) {
   return seen;
 }
 
-TEST_F(Samples, WithoutTheRcmTheFeaturesAreAsGood) {
-  expect_features_without_rcm(sample_frames("rotation"), 3 * mrad);
-}
-
-TEST_F(Samples, AWrongRegistrationGivesFeaturesButNoRotation) {
-  EXPECT_GE(seen_with_a_wrong_registration(sample_frames("rotation")), 8);
-}
-
 // Frames that are in this repository (acceptance/frames/README.md), of 400x225 pixels: a marker 170 px long has twice
 // the errors of docs/notes/accuracy.md.
 TEST(Stored, RotationIsFoundWithAnHonestSigma) {
@@ -262,13 +253,6 @@ RenderedSet moving_set(std::uint64_t seed, int count, int times) {
     set.configurations.push_back(
         {JointVector::from_vector(from + (to - from) * (0.5 - 0.5 * std::cos(pi * times * i / (count - 1))))});
   return set;
-}
-
-Score score_tracked(const RenderedSet& set) {
-  Tracker tracker(set.rig);
-  Score score;
-  for (const TrueFrame& frame : rendered_frames(set)) score.add(frame, tracker.track(frame.bgr));
-  return score;
 }
 
 // A full turn, seam included; so many places that the normalised error is known to a tenth.
@@ -340,7 +324,9 @@ TEST(Rendered, AlmostNoLight) {
 TEST(Rendered, BlurredMarkersAreNotGuessed) {
   RenderedSet set = moving_set(53, 40, 4);
   set.motion = 0.4;
-  const Score tracked = score_tracked(set);
+  Tracker tracker(set.rig);
+  Score tracked;
+  for (const TrueFrame& frame : rendered_frames(set)) tracked.add(frame, tracker.track(frame.bgr));
   EXPECT_EQ(tracked.wrong, 0);
   EXPECT_GT(tracked.found_fraction(), 0.3);
   EXPECT_LE(rms(tracked.psi_sigmas), 5);
@@ -379,32 +365,6 @@ TEST(Rendered, OtherDesignsResponsesAndSizes) {
   set.rig.instruments[0].marker.seam_rad = 1.3;
   set.rig.instruments[0].marker.hues_deg = {150, 220, 285};
   expect_found_within(score_single(rendered_frames(set)), 1, 6 * mrad);
-}
-
-TEST(Rendered, NothingIsFoundInTissue) {
-  const Rig rig = example_rig();
-  for (const std::uint64_t seed : {41, 42, 43, 44}) {
-    Renderer renderer(rig.camera, {}, make_tissue(rig.camera.width_px, rig.camera.height_px, seed));
-    EXPECT_NE(Tracker(rig).track(renderer.render({}, seed))[0].status, Status::ok) << seed;
-  }
-}
-
-// The marker of another order of colours is not taken for ours.
-TEST(Rendered, AnotherInstrumentIsNotOurs) {
-  RenderedSet set = usual_set(45, 6);
-  set.rig.instruments[0].marker.hues_deg = {180, 270, 90};
-  for (TrueFrame& frame : rendered_frames(set)) {
-    frame.rig.instruments[0].marker.hues_deg = {90, 180, 270};
-    EXPECT_NE(Tracker(frame.rig).track(frame.bgr)[0].status, Status::ok);
-  }
-}
-
-// Tracking agrees with looking at every frame anew, and costs no accuracy.
-TEST(Rendered, TrackingFollowsMotion) {
-  const RenderedSet set = moving_set(46, 40, 1);
-  const Score tracked = score_tracked(set);
-  EXPECT_EQ(tracked.found, tracked.expected);
-  EXPECT_LE(rms(tracked.psi_rad), 3 * mrad);
 }
 
 }  // namespace
