@@ -1,6 +1,7 @@
 // Mistakes of users, and the answers of the tool: a table of inputs with one mistake each, the commands that meet it
 // first, and words of the cause and of the remedy that each of them says. The test prints it; a row that fails shows
 // the answer. Inputs are recordings of `lapservo sample`, or of `lapservo render` with another rig, that are altered.
+// More causes are in the tests of FrameDiagnosis, Rig, ArmLimits and TrajectoryCheck.
 
 #include <array>
 #include <cmath>
@@ -40,10 +41,7 @@ const std::string track = "track swing --fps 8 --rig rig.yaml --out seen.csv", c
                   registration = "calibrate registration" + with_joints + " --out out.yaml",
                   marker = "calibrate marker turn --fps 8 --rig rig.yaml --out out.yaml",
                   camera = "calibrate camera boards --board 9x6 --square-mm 5 --rig rig.yaml --out out.yaml",
-                  servo = "servo --rig rig.yaml --robot sim --duration 1 --out run --set-point 2.43,1194,245,175",
-                  arm =
-                      "servo --rig rig.yaml --camera ros2:/endoscope/image_raw --enable-motion --duration 1 "
-                      "--set-point 2.43,1194,245,175 --joint-limits joint_limits.yaml --robot ros2:";
+                  servo = "servo --rig rig.yaml --robot sim --duration 1 --out run --set-point 2.43,1194,245,175";
 
 using Changes = std::vector<std::pair<std::string, std::string>>;
 
@@ -67,11 +65,8 @@ void rewrite(const std::string& file, const std::string& text) {
   write_file(file, text);
 }
 
-std::function<void()> in_file(const std::string& file, Changes changes) {
-  return [=] { rewrite(file, changed(read_file(file), changes)); };
-}
-std::function<void()> in_rig(Changes changes) {
-  return in_file("rig.yaml", std::move(changes));
+std::function<void()> in_rig(const Changes& changes) {
+  return [=] { rewrite("rig.yaml", changed(read_file("rig.yaml"), changes)); };
 }
 
 // As before any registration.
@@ -82,51 +77,14 @@ void forget_registration() {
 }
 
 // A folder of its own in the place of the link.
-std::function<void()> in_images(std::function<cv::Mat(const cv::Mat&)> change, const std::string& extension = ".png",
-                                int quality = 95) {
-  return [=] {
-    const fs::path from = fs::canonical("swing");
-    fs::remove("swing"), fs::create_directory("swing");
-    for (const auto& entry : fs::directory_iterator(from))
-      cv::imwrite("swing/" + entry.path().stem().string() + extension, change(cv::imread(entry.path().string())),
-                  {cv::IMWRITE_PNG_COMPRESSION, 1, cv::IMWRITE_JPEG_QUALITY, quality});
-  };
-}
-
-cv::Mat mirrored(const cv::Mat& bgr) {
-  cv::Mat image;
-  cv::flip(bgr, image, 1);
-  return image;
-}
-cv::Mat turned(const cv::Mat& bgr) {
-  cv::Mat image;
-  cv::rotate(bgr, image, cv::ROTATE_180);
-  return image;
-}
-cv::Mat exchanged(const cv::Mat& bgr) {
-  cv::Mat image;
-  cv::cvtColor(bgr, image, cv::COLOR_BGR2RGB);
-  return image;
-}
-cv::Mat grey(const cv::Mat& bgr) {
-  cv::Mat image;
-  cv::cvtColor(bgr, image, cv::COLOR_BGR2GRAY);
-  cv::cvtColor(image, image, cv::COLOR_GRAY2BGR);
-  return image;
-}
-std::function<cv::Mat(const cv::Mat&)> levels(double gain, double offset) {
-  return [=](const cv::Mat& bgr) {
+void mirror_images() {
+  const fs::path from = fs::canonical("swing");
+  fs::remove("swing"), fs::create_directory("swing");
+  for (const auto& entry : fs::directory_iterator(from)) {
     cv::Mat image;
-    bgr.convertTo(image, -1, gain, offset);
-    return image;
-  };
-}
-// A sensor's noise in the dark.
-cv::Mat covered(const cv::Mat& bgr) {
-  cv::Mat image(bgr.size(), bgr.type());
-  cv::RNG random(7);
-  random.fill(image, cv::RNG::UNIFORM, 0, 5);
-  return image;
+    cv::flip(cv::imread(entry.path().string()), image, 1);
+    cv::imwrite("swing/" + entry.path().filename().string(), image, {cv::IMWRITE_PNG_COMPRESSION, 1});
+  }
 }
 
 // Columns time_s, yaw, pitch, insertion, roll.
@@ -181,11 +139,6 @@ const Changes guessed_focal{{focal, "[1200, 0, 474.3, 0, 1200,"}};
 std::vector<Mistake> mistakes() {
   const auto moved_endoscope = mounted("swing", {{"[-0.078, 0.067, 0.059]", "[-0.072, 0.067, 0.063]"}});
   return {
-      {"radius for diameter",
-       in_rig({{diameter, "diameter_m: 0.0042"}}),
-       {track, check},
-       {"twice the rig's", "not the radius"}},
-      {"diameter in mm", in_rig({{diameter, "diameter_m: 8.4"}}), {track}, {"diameter_m: is 8.4", "metres"}},
       {"diameter 5 % off",
        in_rig({{diameter, "diameter_m: 0.0088"}}),
        {marker},
@@ -194,10 +147,6 @@ std::vector<Mistake> mistakes() {
        mounted("turn", printed_at_96_percent),
        {marker},
        {"4.0 % shorter", "printer", "callipers"}},
-      {"hues in reverse order",
-       in_rig({{hues, "hues_deg: [294, 209, 116]"}}),
-       {track, check},
-       {"hues in another order", "hues_deg: [116, 209, 294]"}},
       {"hues of the print's design",
        in_rig({{hues, "hues_deg: [90, 180, 270]"}}),
        {check},
@@ -215,31 +164,7 @@ std::vector<Mistake> mistakes() {
        [] { in_rig(guessed_focal)(), forget_registration(); },
        {track, check, registration},
        {"focal length of about", "has 1200", "calibrate camera"}},
-      {"focal length in mm", in_rig({{focal, "[4, 0, 474.3, 0, 4,"}}), {track}, {"camera_matrix", "in pixels"}},
-      {"another size of image",
-       in_rig({{"image_width: 960", "image_width: 1920"},
-               {"image_height: 540", "image_height: 1080"},
-               {focal, "[1650, 0, 948.6, 0, 1650,"}}),
-       {track},
-       {"960x540", "1920x1080 as in the rig"}},
-      {"rectified images, lens in the rig",
-       in_rig({{"data: [0, 0, 0, 0, 0]", "data: [-0.3, 0.1, 0, 0, 0]"}}),
-       {track, check, registration},
-       {"already undistorted", "need a rig without"}},
-      {"images mirrored", in_images(mirrored), {track, check}, {"image is mirrored", "mirroring off"}},
-      {"camera upside down", in_images(turned), {track}, {"turned by 180 degrees", "camera_from_rcm"}},
-      {"red and blue exchanged",
-       in_images(exchanged),
-       {track, check},
-       {"red and blue are exchanged", "BGR is expected"}},
-      {"grey images", in_images(grey), {track, check}, {"grey", "sends mono"}},
-      {"too dark", in_images(levels(0.12, 0)), {track, check}, {"dark", "raise the light or the exposure"}},
-      {"overexposed", in_images(levels(2.5, 60)), {track, check}, {"overexposed", "lower the exposure"}},
-      {"lens cap", in_images(covered), {track, check}, {"dark", "cap off the lens"}},
-      {"strong compression",
-       in_images([](const cv::Mat& bgr) { return bgr; }, ".jpg", 12),
-       {track, check},
-       {"compressed", "higher bit rate"}},
+      {"images mirrored", mirror_images, {track, check}, {"image is mirrored", "mirroring off"}},
       {"too far away",
        [] {
          in_rig({{focal, "[240, 0, 474.3, 0, 240,"}})(), render("swing", {});
@@ -305,19 +230,7 @@ std::vector<Mistake> mistakes() {
        moved_endoscope,
        {check},
        {"the endoscope or the arm's base was moved", "calibrate registration"}},
-      {"offset in degrees",
-       in_rig({{"offset: [0, 1.5,", "offset: [0, 86,"}}),
-       {track},
-       {"joints.offset", "looks like degrees"}},
       {"squares for inner corners", [] {}, {changed(camera, {{"9x6", "10x7"}})}, {"number of inner corners"}},
-      {"a turn that ends early",
-       [] {
-         const fs::path from = fs::canonical("turn");
-         fs::remove("turn"), fs::create_directory("turn");
-         for (int i = 0; i < 12; ++i) fs::copy(from / ((i < 10 ? "000" : "00") + std::to_string(i) + ".png"), "turn");
-       },
-       {marker},
-       {"degrees are missing", "full turn"}},
       {"a turn for the swing",
        [] {},
        {"calibrate registration turn --fps 8 --joints turn_joints.csv --rig rig.yaml --out out.yaml"},
@@ -326,27 +239,11 @@ std::vector<Mistake> mistakes() {
        forget_registration,
        {servo},
        {"camera_from_rcm: is missing", "calibrate registration measures it"}},
-      {"goal in degrees", [] {}, {changed(servo, {{"2.43", "139"}})}, {"s_rad is 139", "looks like degrees"}},
       {"rates in degrees",
        [] { write_file("fast.yaml", "limits: {rate: [23, 23, 0.04, 86]}\n"); },
        {servo + " --controller fast.yaml"},
        {"limits.rate", "looks like degrees"}},
       {"delay in seconds", [] {}, {servo + " --delay-ms 0.08"}, {"--delay-ms", "looks like seconds"}},
-      {"a key of another program",
-       [] { write_file("gain.yaml", "gain: 5\n"); },
-       {servo + " --controller gain.yaml"},
-       {"gain: is unknown", "gains_per_s"}},
-#ifdef LAPSERVO_ROS2
-      {"joint limits in degrees",
-       in_file("joint_limits.yaml", {{"lower: [-1.5, -1.5", "lower: [-85, -85"}}),
-       {arm + "PSM1"},
-       {"joint_limits.yaml: lower", "looks like degrees"}},
-      {"joint limits in mm",
-       in_file("joint_limits.yaml", {{"0.24, 7]", "240, 7]"}}),
-       {arm + "PSM1"},
-       {"joint_limits.yaml: upper", "looks like millimetres"}},
-      {"the other arm", [] {}, {arm + "PSM2"}, {"PSM2, and the rig has PSM1", "--instrument PSM1"}},
-#endif
   };
 }
 
@@ -358,8 +255,7 @@ class Mistakes : public acceptance::ToolTest {
     fs::create_directory(folder);
     fs::current_path(folder);
     for (const char* name : {"swing", "turn", "boards"}) fs::create_directory_symlink(sample / name, name);
-    for (const char* name : {"swing_joints.csv", "turn_joints.csv", "joint_limits.yaml"})
-      fs::create_symlink(sample / name, name);
+    for (const char* name : {"swing_joints.csv", "turn_joints.csv"}) fs::create_symlink(sample / name, name);
     fs::create_symlink(sample / "truth.yaml", "rig.yaml");
     mistake.make();
     int named = 0;
