@@ -311,54 +311,34 @@ TEST(VisualController, ConvergesInTheImageWithAWrongModelAndBacklash) {
   }
 }
 
-// The paper's swings at paces that differ, so that one joint turns at a time and what its backlash does shows most.
-Sinusoids one_joint_at_a_time() {
-  Sinusoids f = paper_sinusoids();
-  f.omega_rad_s = {0.52, 0.63, 0.45, 0.70};
-  return f;
-}
-
-/// The usual flaws with backlash in rho and psi.
-Flaws with_backlash(double latency_s, bool delay_known) {
-  Flaws flaws = usual_flaws();
-  flaws.backlash = {0, 0, 0.0001, 0.02};
-  flaws.latency_s = latency_s;
-  flaws.delay_known = delay_known;
-  return flaws;
-}
-
-/// Runs that learn the backlash at each latency, known or estimated, and what more is to be said of them.
-void expect_backlash_learnt(const Trajectory& trajectory, double duration_s,
-                            const std::function<void(const std::vector<Moment>&, const Flaws&)>& law) {
+// By the paper's swings at paces that differ: one joint turns at a time, and what its backlash does shows most.
+TEST(VisualController, LearnsBacklashSoThatReversalsLeaveLittleError) {
+  Sinusoids one_joint_at_a_time = paper_sinusoids();
+  one_joint_at_a_time.omega_rad_s = {0.52, 0.63, 0.45, 0.70};
+  const auto trajectory = sinusoids(one_joint_at_a_time);
+  Eigen::Vector4d rms_at_zero = Eigen::Vector4d::Zero();
   for (const bool known : {true, false}) {
     for (const double latency_s : {0.0, 0.08, 0.15, 0.25}) {
       SCOPED_TRACE(std::string(known ? "known " : "estimated ") + std::to_string(latency_s));
-      const Flaws flaws = with_backlash(latency_s, known);
-      const auto done = run(flaws, trajectory, duration_s, 3);
+      Flaws flaws = usual_flaws();
+      flaws.backlash = {0, 0, 0.0001, 0.02};
+      flaws.latency_s = latency_s, flaws.delay_known = known;
+      ControllerConfig unlearnt = testing::test_config(flaws);
+      unlearnt.observer.backlash.largest.setZero();
+      const auto done = run(flaws, trajectory, 40, 3),
+                 before = run(unlearnt, testing::model_of({}), flaws, trajectory, 40, 3);
       const Eigen::Vector4d width = done.moments.back().step.estimate->gap.width;
       for (const int i : {2, 3}) EXPECT_NEAR(width[i], flaws.backlash[i], 0.15 * flaws.backlash[i]) << i;
       EXPECT_TRUE(width.head<2>().isZero());
-      law(done.moments, flaws);
+      const Eigen::Vector4d rms = rms_after(done.moments, 15), rms_unlearnt = rms_after(before.moments, 15);
+      EXPECT_LT(rms[1], rms_unlearnt[1] / 4);
+      EXPECT_LT(rms[3], rms_unlearnt[3] / 3);
+      if (latency_s == 0) rms_at_zero = rms;
+      if (latency_s <= 0.15) {
+        EXPECT_LT(rms.cwiseQuotient(rms_at_zero).maxCoeff(), 1.2);
+      }
     }
   }
-}
-
-TEST(VisualController, LearnsBacklashSoThatReversalsLeaveLittleError) {
-  const auto trajectory = sinusoids(one_joint_at_a_time());
-  Eigen::Vector4d rms_at_zero = Eigen::Vector4d::Zero();
-  expect_backlash_learnt(trajectory, 40, [&](const std::vector<Moment>& moments, const Flaws& flaws) {
-    ControllerConfig unlearnt = testing::test_config(flaws);
-    unlearnt.observer.backlash.largest.setZero();
-    const auto before = run(unlearnt, testing::model_of({}), flaws, trajectory, 40, 3);
-    const Eigen::Vector4d rms = rms_after(moments, 15);
-    const Eigen::Vector4d rms_unlearnt = rms_after(before.moments, 15);
-    EXPECT_LT(rms[1], rms_unlearnt[1] / 4);
-    EXPECT_LT(rms[3], rms_unlearnt[3] / 3);
-    if (flaws.latency_s == 0) rms_at_zero = rms;
-    if (flaws.latency_s <= 0.15) {
-      EXPECT_LT(rms.cwiseQuotient(rms_at_zero).maxCoeff(), 1.2);
-    }
-  });
 }
 
 TEST(VisualController, RestsAtASetPointWithBacklashLearnt) {
