@@ -173,7 +173,7 @@ double most_score(const Lines& lines, const Window& window) {
   return most;
 }
 
-constexpr double least_share = 0.25;  // of the best line's score, for a line that shows the marker
+constexpr double least_share = 1.0 / 3;  // of the best line's score, for a line that shows the marker
 
 // A foreshortened marker is wider than by its length.
 Window grown(Window window, const Lines& lines) {
