@@ -74,7 +74,7 @@ bool may_be_in_order(BandCosines& bands) {
 std::optional<Fan> fan_over(const Scene& scene, const Blob& blob, const RaysFromPole& rays, std::size_t lines) {
   constexpr double least_sine = 0.05;
   std::optional<double> alpha_rad;  // of the first sample
-  Eigen::Vector3d ahead, aside;
+  Eigen::Vector3d ahead = Eigen::Vector3d::Zero(), aside = ahead;
   double least_tangent = 1e9, most_tangent = -1e9, least_cosine = 1, most_cosine = -1;
   BandCosines bands;
   for (const Blob::Sample& sample : blob.samples) {
@@ -204,8 +204,8 @@ std::vector<Window> best_windows(const Scene& scene, const Fan& fan, const Lines
 struct Extent {
   double alpha_rad, width_rad;
   std::optional<double> first_beta_rad, last_beta_rad;
-  std::optional<double> only_side_rad;  // alpha of the side that shows where the other one is hidden, and in
-  double away_from_side = 0;            // which direction of alpha the axis lies
+  std::optional<double> only_side_rad{};  // alpha of the side that shows where the other one is hidden, and in
+  double away_from_side = 0;              // which direction of alpha the axis lies
   double sine_of_beta = 1;
   bool other_bands = false;  // most lines show bands that the marker has at no azimuth
 };
