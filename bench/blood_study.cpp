@@ -1,11 +1,11 @@
 #include "bench/accuracy_study.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/core/random.h"
-#include "lapservo/geometry/rotation.h"
 #include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/sim/blood.h"
 #include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/tissue.h"
+#include "lapservo/vision/shaft/shaft_pose.h"
 
 namespace lapservo::bench {
 namespace {
@@ -42,11 +42,9 @@ JointVector configuration(const Rig& rig, double steepest_rad, Random& random) {
 std::vector<Observation> with_q(std::vector<Observation> seen, const Instrument& instrument) {
   for (Observation& one : seen) {
     if (one.rcm || !one.marker) continue;
-    const Rigid3& pose = one.marker->camera_from_marker;
-    auto q = configuration_through(*instrument.camera_from_rcm, pose.translation).value();
-    const Rigid3 unturned = camera_from_marker(instrument.marker, *instrument.camera_from_rcm, q);
-    q.psi_rad = wrap_pi(rotation_vector_of(unturned.rotation.conjugate() * pose.rotation).z());
-    one.rcm.emplace().q = q;
+    const Rigid3 unrolled_from_marker = camera_from_marker(instrument.marker, Rigid3(), 0).inverse();
+    const ShaftPose pose{one.marker->camera_from_marker * unrolled_from_marker, 0};
+    one.rcm.emplace().q = configuration_of(pose, *instrument.camera_from_rcm).value();
     one.rcm->covariance = Eigen::Matrix4d::Identity() * std::pow(one.marker->sigma_roll_rad, 2);
   }
   return seen;

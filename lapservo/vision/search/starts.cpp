@@ -202,6 +202,7 @@ std::vector<Window> best_windows(const Scene& scene, const Fan& fan, const Lines
 
 // A window's view of the marker.
 struct Extent {
+  RaysFromPole rays;
   double alpha_rad, width_rad;
   std::optional<double> first_beta_rad, last_beta_rad;
   std::optional<double> only_side_rad{};  // alpha of the side that shows where the other one is hidden, and in
@@ -247,7 +248,7 @@ Extent extent_of(const Scene& scene, const RaysFromPole& rays, const Fan& fan, c
     if (lines[i].split.seen[0]) first.push_back(fan.beta_rad(lines[i].split.position[0]));
     if (lines[i].split.seen[3]) last.push_back(fan.beta_rad(lines[i].split.position[3]));
   }
-  Extent extent{fan.alpha_rad(sum / count), 0, agreed_end(first), agreed_end(last)};
+  Extent extent{rays, fan.alpha_rad(sum / count), 0, agreed_end(first), agreed_end(last)};
   constexpr double most_of_them = 0.75;
   extent.other_bands = with_other_bands > most_of_them * count;
   const Line& middle = lines[window.middle];
@@ -276,56 +277,53 @@ double alpha_of_axis(const Scene& scene, const Extent& extent, double distance_m
 
 // How far away the proximal end of a shaft through the RCM is, by the length that the marker shows; by its width where
 // the length does not show it.
-double distance_of(const Scene& scene, const RaysFromPole& rays, const Extent& extent, double first_beta_rad,
-                   double rcm_m) {
+double distance_of(const Scene& scene, const Extent& extent, double first_beta_rad, double rcm_m) {
   constexpr int steps = 120;
   constexpr double nearest_m = 0.03, farthest_m = 0.4, sigma_rad = 0.005, sigma_log = 0.3;
   const double by_width_m = distance_by_width_m(scene, extent);
   if (!extent.first_beta_rad || !extent.last_beta_rad) return by_width_m;
-  const Eigen::Vector3d rcm = rcm_m * rays.pole();
+  const Eigen::Vector3d rcm = rcm_m * extent.rays.pole();
   double least = 1e300, best_m = by_width_m;
   for (int i = 0; i <= steps; ++i) {
     const double distance_m = nearest_m * std::pow(farthest_m / nearest_m, 1.0 * i / steps);
-    const Eigen::Vector3d proximal = distance_m * rays.ray(extent.alpha_rad, first_beta_rad);
+    const Eigen::Vector3d proximal = distance_m * extent.rays.ray(extent.alpha_rad, first_beta_rad);
     const Eigen::Vector3d distal = proximal + scene.marker.length_m() * (proximal - rcm).normalized();
-    const double cost = std::pow((rays.beta_rad(distal) - *extent.last_beta_rad) / sigma_rad, 2) +
+    const double cost = std::pow((extent.rays.beta_rad(distal) - *extent.last_beta_rad) / sigma_rad, 2) +
                         std::pow(std::log(distance_m / by_width_m) / sigma_log, 2);
     if (cost < least) least = cost, best_m = distance_m;
   }
   return best_m;
 }
 
-std::optional<PoseUnknowns> start_through_rcm(const Scene& scene, const RaysFromPole& rays, const Extent& extent,
-                                              const Rigid3& camera_from_rcm) {
+std::optional<PoseUnknowns> start_through_rcm(const Scene& scene, const Extent& extent, const Rigid3& camera_from_rcm) {
   const double rcm_m = camera_from_rcm.translation.norm();
   double first_beta_rad = extent.first_beta_rad.value_or(0);
   if (!extent.first_beta_rad) {
     // Seen squarely.
-    const double distance_m = distance_of(scene, rays, extent, 0, rcm_m);
+    const double distance_m = distance_of(scene, extent, 0, rcm_m);
     first_beta_rad = *extent.last_beta_rad - scene.marker.length_m() / distance_m;
   }
-  const double distance_m = distance_of(scene, rays, extent, first_beta_rad, rcm_m);
+  const double distance_m = distance_of(scene, extent, first_beta_rad, rcm_m);
   const double alpha_rad = alpha_of_axis(scene, extent, distance_m);
-  const auto q = configuration_through(camera_from_rcm, distance_m * rays.ray(alpha_rad, first_beta_rad));
+  const auto q = configuration_through(camera_from_rcm, distance_m * extent.rays.ray(alpha_rad, first_beta_rad));
   return q ? std::optional(PoseUnknowns(pose_through_rcm(camera_from_rcm, *q), true)) : std::nullopt;
 }
 
 // At a distance of the axis, the foreshortening leaves two poses, tip towards or away from the camera, or one where
 // there is none.
-void add_free_starts(const Scene& scene, const RaysFromPole& rays, const Extent& extent, double distance_m,
-                     std::vector<PoseUnknowns>& starts) {
+void add_free_starts(const Scene& scene, const Extent& extent, double distance_m, std::vector<PoseUnknowns>& starts) {
   constexpr double least_tilt_rad = 0.05;
   const double length_m = scene.marker.length_m(), alpha_rad = alpha_of_axis(scene, extent, distance_m);
   const double shown_rad = length_m / distance_m;  // seen squarely
   const double first_beta_rad = extent.first_beta_rad.value_or(*extent.last_beta_rad - shown_rad);
   const double last_beta_rad = extent.last_beta_rad.value_or(first_beta_rad + shown_rad);
   const double tilt_rad = std::acos(std::clamp((last_beta_rad - first_beta_rad) / shown_rad, 0.0, 1.0));
-  const Eigen::Vector3d sight = rays.ray(alpha_rad, (first_beta_rad + last_beta_rad) / 2);
-  const Eigen::Vector3d across_sight = (sight * sight.dot(rays.pole()) - rays.pole()).normalized();
+  const Eigen::Vector3d sight = extent.rays.ray(alpha_rad, (first_beta_rad + last_beta_rad) / 2);
+  const Eigen::Vector3d across_sight = (sight * sight.dot(extent.rays.pole()) - extent.rays.pole()).normalized();
   for (const double sign : {1.0, -1.0}) {
     const Eigen::Vector3d axis = std::cos(tilt_rad) * across_sight + sign * std::sin(tilt_rad) * sight;
     const Eigen::Vector3d proximal =
-        (distance_m - sign * std::sin(tilt_rad) * length_m / 2) * rays.ray(alpha_rad, first_beta_rad);
+        (distance_m - sign * std::sin(tilt_rad) * length_m / 2) * extent.rays.ray(alpha_rad, first_beta_rad);
     starts.push_back(PoseUnknowns({{rotation_between(Eigen::Vector3d::UnitZ(), axis), proximal}, 0}, false));
     if (tilt_rad < least_tilt_rad) break;
   }
@@ -390,28 +388,19 @@ std::optional<Eigen::Vector3d> long_direction(const Scene& scene, const Blob& bl
   return (direction - direction.dot(middle) / middle.squaredNorm() * middle).normalized();
 }
 
-void add_starts(const Scene& scene, const SplitFan& split, const std::optional<Rigid3>& camera_from_rcm, Starts& starts,
-                std::vector<PoseUnknowns>& nearer) {
+void add_extents(const Scene& scene, const SplitFan& split, std::vector<Extent>& extents) {
   for (const Window& window : split.windows) {
     const Extent extent = extent_of(scene, split.rays, split.fan, split.lines, window);
-    if (!extent.first_beta_rad && !extent.last_beta_rad) continue;
-    starts.other_bands |= extent.other_bands;
-    if (!camera_from_rcm) {
-      const double distance_m = distance_by_width_m(scene, extent);
-      add_free_starts(scene, split.rays, extent, distance_m, starts.poses);
-      add_free_starts(scene, split.rays, extent, nearer_scale * distance_m, nearer);
-    } else if (auto start = start_through_rcm(scene, split.rays, extent, *camera_from_rcm)) {
-      starts.poses.push_back(std::move(*start));
-    }
+    if (extent.first_beta_rad || extent.last_beta_rad) extents.push_back(extent);
   }
 }
 
-void add_starts(const Scene& scene, const Blob& blob, const std::optional<Rigid3>& camera_from_rcm, Starts& starts,
-                std::vector<PoseUnknowns>& nearer) {
+void add_extents(const Scene& scene, const Blob& blob, const std::optional<Rigid3>& camera_from_rcm,
+                 std::vector<Extent>& extents) {
   if (camera_from_rcm) {
     if (!(camera_from_rcm->translation.norm() > 1e-3)) return;
     if (const auto split = split_fan(scene, blob, camera_from_rcm->translation.normalized()))
-      add_starts(scene, *split, camera_from_rcm, starts, nearer);
+      add_extents(scene, *split, extents);
     return;
   }
   const auto direction = long_direction(scene, blob);
@@ -419,23 +408,32 @@ void add_starts(const Scene& scene, const Blob& blob, const std::optional<Rigid3
   for (const Eigen::Vector3d& pole : {*direction, Eigen::Vector3d(-*direction)}) {
     auto split = split_fan(scene, blob, pole, few_lines);
     if (split && !split->windows.empty()) split = split_fan(scene, blob, turned_pole(*split));
-    if (split) add_starts(scene, *split, camera_from_rcm, starts, nearer);
+    if (split) add_extents(scene, *split, extents);
   }
 }
 
 }  // namespace
 
 Starts starts_in(const Scene& scene, const Blob& blob, const std::optional<Rigid3>& camera_from_rcm) {
-  Starts starts;
-  std::vector<PoseUnknowns> nearer;
-  add_starts(scene, blob, camera_from_rcm, starts, nearer);
+  std::vector<Extent> extents;
+  add_extents(scene, blob, camera_from_rcm, extents);
   if (!scene.others.empty()) {
     Scene alone = scene;
     alone.others = {};
-    add_starts(alone, blob, camera_from_rcm, starts, nearer);
+    add_extents(alone, blob, camera_from_rcm, extents);
   }
-  if (!camera_from_rcm) starts.rivals = starts.poses.size();
-  starts.poses.insert(starts.poses.end(), nearer.begin(), nearer.end());
+  Starts starts;
+  for (const Extent& extent : extents) {
+    starts.other_bands |= extent.other_bands;
+    if (!camera_from_rcm) continue;
+    if (auto start = start_through_rcm(scene, extent, *camera_from_rcm)) starts.poses.push_back(*start);
+  }
+  if (camera_from_rcm) return starts;
+  for (const double scale : {1.0, nearer_scale}) {
+    starts.rivals = starts.poses.size();
+    for (const Extent& extent : extents)
+      add_free_starts(scene, extent, scale * distance_by_width_m(scene, extent), starts.poses);
+  }
   return starts;
 }
 
