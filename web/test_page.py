@@ -251,6 +251,15 @@ def see_the_loop(browser, tool, rig, folder):
         lapservo.wait()
 
 
+def open_anew(browser, url):
+    browser.call("Page.navigate", url="about:blank")  # the page of the run before still polls
+    time.sleep(1)
+    browser.value("1")
+    browser.complaints.clear()
+    browser.call("Page.navigate", url=url)
+    browser.resize(1280, 800)
+
+
 def see_the_tip(browser, tool, rig, folder):
     """Shift and a click, confirmed, move it; a click alone, or one that is cancelled, does not."""
     with tempfile.NamedTemporaryFile("w", suffix=".yaml") as with_tool:
@@ -265,12 +274,7 @@ def see_the_tip(browser, tool, rig, folder):
                          x=box["x"] + right * box["w"], y=box["y"] + down * box["h"])
 
     try:
-        browser.call("Page.navigate", url="about:blank")  # the page of the run before still polls
-        time.sleep(1)
-        browser.value("1")
-        browser.complaints.clear()
-        browser.call("Page.navigate", url=url)
-        browser.resize(1280, 800)
+        open_anew(browser, url)
         state(browser, "track")
         browser.wait_for("document.getElementById('picture').naturalWidth > 0")
         asked = "!document.getElementById('tip').hidden"
@@ -334,12 +338,7 @@ def see_the_run_button(browser, tool, rig):
         "a network that is gone": (lambda: press_key("keyDown", " "), lambda: browser.connect(False)),
     }
     try:
-        browser.call("Page.navigate", url="about:blank")  # the page of the run before still polls
-        time.sleep(1)
-        browser.value("1")
-        browser.complaints.clear()
-        browser.call("Page.navigate", url=url)
-        browser.resize(1280, 800)
+        open_anew(browser, url)
         state(browser, "hold: operator_absent")
         assert browser.value("document.getElementById('start').hidden"), "there are two buttons that start"
         for name, (press, let_go) in ways.items():
