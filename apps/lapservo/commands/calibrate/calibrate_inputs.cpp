@@ -32,9 +32,7 @@ void add_board_options(Command command, BoardOptions& options, bool required) {
 }
 
 Board board_of(const BoardOptions& options) {
-  if (options.corners.empty() || !options.square_mm)
-    throw InputError("--board", "needs --square-mm beside it, for example --board 9x6 --square-mm 5");
-  BoardWords words{options.corners, 1e-3 * *options.square_mm, options.dictionary};
+  BoardWords words{options.corners, 1e-3 * options.square_mm.value(), options.dictionary};
   if (options.marker_mm) words.marker_m = 1e-3 * *options.marker_mm;
   return internal::board_of(words);
 }

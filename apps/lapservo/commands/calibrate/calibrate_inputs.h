@@ -25,7 +25,7 @@ struct BoardOptions {
   std::optional<double> square_mm, marker_mm;
 };
 void add_board_options(Command command, BoardOptions& options, bool required);
-/// Throws InputError without corners or squares.
+/// `square_mm` is given. Throws InputError for corners that are no board's.
 internal::Board board_of(const BoardOptions& options);
 
 /// All but the input and the joints, which each subcommand describes itself.

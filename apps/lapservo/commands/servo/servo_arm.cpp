@@ -153,7 +153,7 @@ std::string wait_for_topics(const ServoOptions& options, Transports& transports,
 InterlockConfig interlock_of(const ServoOptions& options, const RunConfig& config) {
   InterlockConfig interlock;
   interlock.joints = joints_of(options, config.rig);
-  if (const auto& tool = config.rig.instruments.front().tool) interlock.wrist = internal::wrist_names(*tool);
+  if (const auto& tool = config.rig.instruments.front().tool) interlock.wrist = wrist_names(*tool);
   interlock.limits = config.controller.limits;
   interlock.motion_enabled = options.enable_motion;
   interlock.max_readers = static_cast<std::size_t>(options.setpoint_readers);

@@ -49,7 +49,7 @@ void ServoPage::tell(const ControlTick& tick, double time_s, const std::string& 
   }
   if (tick.seen) {
     const Observation& seen = tick.seen->observations.front();
-    seen_m_ = seen.tip ? std::optional(seen.tip->camera_from_tip.translation) : std::nullopt;
+    tip_depth_m_ = seen.tip ? std::optional(seen.tip->camera_from_tip.translation.z()) : std::nullopt;
     first_from_camera_ = tick.seen->first_from_camera;
     web_.show({tick.seen->image.bgr, rig_, tick.seen->observations, tick.input.time_s - tick.seen->image.time_s});
   }
@@ -64,8 +64,8 @@ std::optional<TipGoal> ServoPage::tip_goal() {
   if (!wanted_px) return std::nullopt;
   const auto ideal_px = rig_->camera.ideal_from_raw(*wanted_px);
   if (!ideal_px) throw InputError("tip_goal", "lies where the lens shows nothing");
-  if (!seen_m_) throw InputError("tip_goal", "needs the tip's depth, and the image does not show the tip now");
-  return TipGoal{first_from_camera_ * Eigen::Vector3d(seen_m_->z() * rig_->camera.ray_from_ideal(*ideal_px))};
+  if (!tip_depth_m_) throw InputError("tip_goal", "needs the tip's depth, and the image does not show the tip now");
+  return TipGoal{first_from_camera_ * Eigen::Vector3d(*tip_depth_m_ * rig_->camera.ray_from_ideal(*ideal_px))};
 }
 
 void ServoPage::answer(double time_s, const std::string& words) {

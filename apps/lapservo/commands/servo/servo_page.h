@@ -34,7 +34,7 @@ class ServoPage {
   std::shared_ptr<const Rig> rig_;  ///< with the camera_from_rcm that the loop goes by
   int registration_ = 0;
   std::optional<Eigen::Vector2d> tip_px_;  ///< where it is wanted
-  std::optional<Eigen::Vector3d> seen_m_;  ///< the tip in the newest image
+  std::optional<double> tip_depth_m_;      ///< in the newest image
   Rigid3 first_from_camera_;               ///< of that image
   std::string answer_;
 };
