@@ -140,7 +140,7 @@ TEST(FrameTopics, TheTipHasAFrameAndAPose) {
   EXPECT_EQ(pose.frame, "endoscope");
   EXPECT_EQ(pose.position_m[1], 0.02);
   EXPECT_EQ(pose.covariance[35], 1e-6);
-  const auto& frame = transport.sent<TransformsMessage>("/tf").at(1).transforms.back();
+  const auto frame = transport.sent<TransformsMessage>("/tf").at(1).transforms.back();
   EXPECT_EQ(frame.child, "PSM1_tip");
   EXPECT_EQ(frame.frame_from_child, camera_from_tip);
 }
