@@ -6,12 +6,12 @@
 
 #include "lapservo/core/angles.h"
 #include "lapservo/marker/azimuths.h"
+#include "lapservo/vision/colour/blob_search.h"
+#include "lapservo/vision/decision/fit_observation.h"
 #include "lapservo/vision/decision/two_moments.h"
 #include "lapservo/vision/decision/verification.h"
-#include "lapservo/vision/colour/blob_search.h"
 #include "lapservo/vision/edges/blurred_edges.h"
 #include "lapservo/vision/image/light_image.h"
-#include "lapservo/vision/decision/fit_observation.h"
 
 namespace lapservo::internal {
 
