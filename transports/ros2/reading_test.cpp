@@ -97,10 +97,9 @@ TEST(Reading, WhatAWriterSaidBeforeItWentComesOnceInItsOrder) {
   const auto from = node_elsewhere();
   TestInbox<OperatingStateMessage> heard;
   const auto subscription = to.subscribe_operating_state(topic, heard.handler());
-  const auto& type = Wire<OperatingStateMessage>::descriptor();
   int said = 0;
   for (int round = 0; round < 20; ++round) {
-    const dds_entity_t writer = from->create_writer(topic, type, Delivery::reliable);
+    const dds_entity_t writer = from->create_writer(topic, Wire<OperatingStateMessage>::descriptor(), Delivery::reliable);
     ASSERT_TRUE(testing::wait_for([&] { return dds_get_matched_subscriptions(writer, nullptr, 0) == 2; }));
     std::this_thread::sleep_for(std::chrono::milliseconds(100));  // until the readers have its first heartbeat, too
     for (int k = 0; k < 2; ++k) Wire<OperatingStateMessage>::write(writer, state(++said));
