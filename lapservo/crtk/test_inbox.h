@@ -1,7 +1,6 @@
 #pragma once
 
 #include <chrono>
-#include <condition_variable>
 #include <functional>
 #include <mutex>
 #include <utility>
@@ -10,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/crtk/transport.h"
+#include "lapservo/testing/wait_for.h"
 
 namespace lapservo::internal {
 
@@ -21,7 +21,6 @@ class TestInbox {
     return [this](Message&& message) {
       const std::lock_guard lock(mutex_);
       messages_.push_back(std::move(message));
-      changed_.notify_all();
     };
   }
   std::vector<Message> all() {
@@ -39,21 +38,14 @@ class TestInbox {
   }
   /// The first message. Says it again until it arrives: discovery takes its time.
   Message get(const std::function<void()>& say) {
-    std::unique_lock lock(mutex_);
-    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
-    while (messages_.empty() && std::chrono::steady_clock::now() < end) {
-      lock.unlock();
-      say();
-      lock.lock();
-      changed_.wait_for(lock, std::chrono::milliseconds(20), [this] { return !messages_.empty(); });
-    }
-    EXPECT_FALSE(messages_.empty());
-    return messages_.empty() ? Message{} : messages_.front();
+    const bool came = testing::wait_for([&] { return !empty() || (say(), !empty()); }, std::chrono::milliseconds(20));
+    EXPECT_TRUE(came);
+    const std::lock_guard lock(mutex_);
+    return came ? messages_.front() : Message{};
   }
 
  private:
   std::mutex mutex_;
-  std::condition_variable changed_;
   std::vector<Message> messages_;
 };
 

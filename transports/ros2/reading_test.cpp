@@ -70,10 +70,7 @@ void expect_order(Delivery offered, auto subscribe, Message (*numbered)(int)) {
     const int size = 2 + burst % 4;
     for (int k = 0; k < size; ++k) Wire<Message>::write(writer, numbered(++said));
     count += static_cast<std::size_t>(size);
-    const auto end = std::chrono::steady_clock::now() + std::chrono::milliseconds(500);
-    while (heard.count() < count && std::chrono::steady_clock::now() < end)
-      std::this_thread::sleep_for(std::chrono::microseconds(50));
-    if (heard.count() < count) break;
+    if (!testing::wait_for([&] { return heard.count() >= count; }, std::chrono::microseconds(50))) break;
   }
   std::this_thread::sleep_for(std::chrono::milliseconds(20));
   EXPECT_EQ(numbers_of(heard), range(1, bursts * 7 / 2)) << static_cast<int>(offered);
@@ -97,16 +94,15 @@ TEST(Reading, WhatAWriterSaidBeforeItWentComesOnceInItsOrder) {
   const auto from = node_elsewhere();
   TestInbox<OperatingStateMessage> heard;
   const auto subscription = to.subscribe_operating_state(topic, heard.handler());
+  const auto& type = Wire<OperatingStateMessage>::descriptor();
   int said = 0;
   for (int round = 0; round < 20; ++round) {
-    const dds_entity_t writer = from->create_writer(topic, Wire<OperatingStateMessage>::descriptor(), Delivery::reliable);
-    ASSERT_TRUE(testing::wait_for([&] { return dds_get_matched_subscriptions(writer, nullptr, 0) == 2; }));
-    std::this_thread::sleep_for(std::chrono::milliseconds(100));  // until the readers have its first heartbeat, too
+    const dds_entity_t writer = from->create_writer(topic, type, Delivery::reliable);
+    wait_for_readers(writer, 2);
     for (int k = 0; k < 2; ++k) Wire<OperatingStateMessage>::write(writer, state(++said));
     from->remove(writer);
   }
-  for (int k = 0; k < 100 && heard.count() < static_cast<std::size_t>(said); ++k)
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  testing::wait_for([&] { return heard.count() >= static_cast<std::size_t>(said); });
   std::this_thread::sleep_for(std::chrono::milliseconds(50));
   EXPECT_EQ(numbers_of(heard), range(1, said));
 }
@@ -124,8 +120,7 @@ TEST(Reading, AStopIsHeardThoughAnotherFloodsItsTopic) {
   const dds_entity_t writer = from->create_writer(topic, type, Delivery::reliable);
   for (const Delivery offered : {Delivery::reliable, Delivery::best_effort}) {
     const dds_entity_t flood = other->create_writer(topic, type, offered);
-    for (const dds_entity_t one : {writer, flood})
-      ASSERT_TRUE(testing::wait_for([&] { return dds_get_matched_subscriptions(one, nullptr, 0) > 0; }));
+    for (const dds_entity_t one : {writer, flood}) wait_for_readers(one, 1);
     for (int stop = 1; stop <= stops; ++stop) {
       Wire<StringMessage>::write(writer, text(stop));
       for (int k = 0; k < others; ++k) Wire<StringMessage>::write(flood, text(0));

@@ -114,9 +114,7 @@ TEST(Ros2Transport, ACommandThatIsSaidOnceIsHeardOnce) {
     TestInbox<CommandMessage> heard;
     const auto subscription = loop.subscribe_commands("/PSM1/move_jp", CommandType::joints, heard.handler());
     const dds_entity_t writer = client->create_writer("/PSM1/move_jp", Wire<JointMessage>::descriptor(), offered);
-    const int readers = offered == Delivery::best_effort ? 1 : 2;
-    testing::wait_for([&] { return dds_get_matched_subscriptions(writer, nullptr, 0) >= readers; });
-    std::this_thread::sleep_for(std::chrono::milliseconds(100));  // until they know it, too
+    wait_for_readers(writer, offered == Delivery::best_effort ? 1 : 2);
     const bool loses = offered == Delivery::reliable;
     dds_domain_set_deafmute(client->participant(), false, loses, DDS_INFINITY);
     Wire<JointMessage>::write(writer, {stamp_s, {}, {1}});

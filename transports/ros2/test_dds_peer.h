@@ -1,10 +1,14 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <cstdlib>
+#include <dds/dds.h>
 #include <memory>
 #include <string>
+#include <thread>
 
+#include "lapservo/testing/wait_for.h"
 #include "transports/ros2/dds_node.h"
 #include "transports/ros2/ros2_names.h"
 
@@ -25,6 +29,12 @@ inline std::unique_ptr<DdsNode> node_elsewhere() {
   auto node = std::make_unique<DdsNode>("elsewhere", handle);
   ::unsetenv("CYCLONEDDS_URI");
   return node;
+}
+
+/// Until a writer of node_elsewhere() has so many readers, and these its first heartbeat: they deliver nothing before.
+inline void wait_for_readers(dds_entity_t writer, int count) {
+  testing::wait_for([&] { return dds_get_matched_subscriptions(writer, nullptr, 0) >= count; });
+  std::this_thread::sleep_for(std::chrono::milliseconds(100));
 }
 
 }  // namespace lapservo::internal
