@@ -6,8 +6,8 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "lapservo/geometry/cylinder.h"
 #include "lapservo/marker/azimuths.h"
+#include "lapservo/vision/shaft/sampled_surface.h"
 
 namespace lapservo::internal {
 namespace {
@@ -33,10 +33,10 @@ bool agrees_well(const FineFit& fit) {
 }
 
 // The print's fault, not the scene's: a boundary is not where it should be on lines on which nothing hides it.
-bool misses_a_boundary(const Scene& scene, const FineFit& fit) {
+bool misses_a_boundary(const ColourAgreement& agreement, const FineFit& fit) {
   for (std::size_t k = 0; k < 4; ++k) {
     if (fit.used[k] >= limits.missed_fraction * fit.in_image[k]) continue;
-    const int clear = lines_in_clear_view(scene, fit.unknowns.pose(), k, fit.lines);
+    const double clear = agreement.clear[k] * fit.lines;
     if (clear >= limits.min_lines && fit.used[k] < limits.missed_fraction * clear) return true;
   }
   return false;
@@ -48,9 +48,9 @@ bool has_right_psi(const Scene& scene, const FineFit& fit) {
 }
 
 // Sigma of psi, and the print.
-Status validate_psi(const Scene& scene, const FineFit& fit) {
+Status validate_psi(const Scene& scene, const ColourAgreement& agreement, const FineFit& fit) {
   const double limit = squared(limits.max_sigma_psi_rad), by_tolerance = fit.psi_variance_by_tolerance;
-  if (fit.off_probability > limits.certainly_off || (by_tolerance < limit && misses_a_boundary(scene, fit)))
+  if (fit.off_probability > limits.certainly_off || (by_tolerance < limit && misses_a_boundary(agreement, fit)))
     return fit.is_well_seen() ? Status::marker_mismatch : Status::uncertain;
   const bool is_sure = fit.psi_variance_rad2() < limit + limits.tolerance_slack * by_tolerance;
   return is_sure && has_right_psi(scene, fit) ? Status::ok : Status::uncertain;
@@ -58,71 +58,54 @@ Status validate_psi(const Scene& scene, const FineFit& fit) {
 
 }  // namespace
 
-int lines_in_clear_view(const Scene& scene, const ShaftPose& pose, std::size_t boundary, int lines) {
-  constexpr double reach = 0.9, beside_px = 4;
-  const auto view = view_cylinder(pose.camera_from_unrolled, scene.marker.radius_m());
-  if (!view) return 0;
-  const Eigen::Vector3d axis = pose.camera_from_unrolled.rotation * Eigen::Vector3d::UnitZ();
-  int count = 0;
-  for (int i = 0; i < lines; ++i) {
-    const double azimuth_rad = visible_azimuth_rad(*view, reach, i, lines);
-    const double tau_rad = marker_azimuth_rad(scene.marker, azimuth_rad, pose.psi_rad);
-    const double along_m = boundaries_m(scene.marker, tau_rad)[boundary];
-    const Eigen::Vector3d point =
-        pose.camera_from_unrolled * surface_point(scene.marker.radius_m(), azimuth_rad, along_m);
-    const double px_per_m = (scene.camera.raw_with_jacobian(point).d_px_d_point * axis).norm();
-    const Eigen::Vector3d beside = beside_px / px_per_m * axis;
-    count += (boundary == 0 || scene.is_ours(scene.class_on_shaft(point - beside))) &&
-             (boundary == 3 || scene.is_ours(scene.class_on_shaft(point + beside)));
-  }
-  return count;
-}
-
 ColourAgreement colour_agreement(const Scene& scene, const ShaftPose& pose, const EdgeBlur& blur) {
-  constexpr int azimuths = 13, places = 40, places_beyond = 4;
-  constexpr double length_beyond = 0.04, blurs_beyond = 2;
-  // About boundaries colours mix: so far, and at least this fraction of the length.
-  constexpr double reach = 0.8, blurred_px = 1.5, min_guard = 0.02;
+  constexpr double length_beyond = 0.04, blurs_beyond = 2, clear_px = 4;
+  // About boundaries and the seam colours mix: so far, and at least this fraction of the length.
+  constexpr double blurred_px = 1.5, min_guard = 0.02;
   const auto view = view_cylinder(pose.camera_from_unrolled, scene.marker.radius_m());
   if (!view) return {};
-  const double length_m = scene.marker.length_m();
+  const double radius_m = scene.marker.radius_m(), length_m = scene.marker.length_m();
   const Eigen::Vector3d axis = pose.camera_from_unrolled.rotation * Eigen::Vector3d::UnitZ();
   const Eigen::Vector3d middle =
-      pose.camera_from_unrolled * surface_point(scene.marker.radius_m(), view->facing_azimuth_rad, length_m / 2);
+      pose.camera_from_unrolled * surface_point(radius_m, view->facing_azimuth_rad, length_m / 2);
   const double px_per_m = (scene.camera.raw_with_jacobian(middle).d_px_d_point * axis).norm();
-  const double guard_m = std::max(min_guard * length_m, blurred_px / px_per_m);
-  int total = 0, inside = 0, matching = 0, wrong = 0;
-  std::array<int, 2> beyond{}, going_on{};  // of both ends
-  for (int i = 0; i < azimuths; ++i) {
-    const double azimuth_rad = visible_azimuth_rad(*view, reach, i, azimuths);
-    const double tau_rad = marker_azimuth_rad(scene.marker, azimuth_rad, pose.psi_rad);
-    if (scene.marker.gap_rad > 0 && distance_to_seam_rad(scene.marker, tau_rad) * scene.marker.radius_m() < guard_m)
-      continue;
+  const double guard_m = std::max(min_guard * length_m, blurred_px / px_per_m), clear_m = clear_px / px_per_m;
+  const std::array blurred_m{std::max(guard_m, blurs_beyond * blur.along_px[0] / px_per_m),
+                             std::max(guard_m, blurs_beyond * blur.along_px[3] / px_per_m)};
+  const SampledSurface surface(scene, pose, *view,
+                               std::max({blurred_m[0], blurred_m[1], clear_m}) + length_beyond * length_m);
+  ColourAgreement agreement;
+  double total = 0, inside = 0;
+  std::array<double, 2> beyond{}, going_on{};  // of both ends
+  for (const SampledSurface::Line& line : surface.lines) {
+    const double tau_rad = marker_azimuth_rad(scene.marker, line.azimuth_rad, pose.psi_rad);
     const auto ends_m = boundaries_m(scene.marker, tau_rad);
-    const Eigen::Vector3d base = pose.camera_from_unrolled * surface_point(scene.marker.radius_m(), azimuth_rad, 0);
-    for (const std::size_t end : {0U, 1U})
-      for (int k = 0; k < places_beyond; ++k) {
-        const double blurred_m = blurs_beyond * blur.along_px[3 * end] / px_per_m;
-        const double away_m = std::max(guard_m, blurred_m) + length_beyond * length_m * (k + 0.5) / places_beyond;
-        const std::uint8_t colour =
-            scene.class_on_shaft(base + (end == 0 ? ends_m[0] - away_m : ends_m[3] + away_m) * axis);
+    const auto is_ours = [&](double along_m) { return scene.is_ours(surface.class_at(line, along_m)); };
+    for (std::size_t k = 0; k < 4; ++k)
+      if ((k == 0 || is_ours(ends_m[k] - clear_m)) && (k == 3 || is_ours(ends_m[k] + clear_m)))
+        agreement.clear[k] += 1.0 / SampledSurface::line_count;
+    if (distance_to_seam_rad(scene.marker, tau_rad) * radius_m < guard_m) continue;
+    for (std::size_t sample = 0; sample < line.classes.size(); ++sample) {
+      const double along_m = surface.along_m(sample);
+      const std::uint8_t colour = line.classes[sample];
+      const auto* const next = std::upper_bound(ends_m.begin(), ends_m.end(), along_m);
+      if (next == ends_m.begin() || next == ends_m.end()) {
+        const std::size_t end = next == ends_m.end();
+        const double away_m = std::abs(along_m - ends_m[3 * end]) - blurred_m[end];
+        if (away_m < 0 || away_m > length_beyond * length_m) continue;
         beyond[end] += colour != Scene::outside, going_on[end] += colour == scene.bands[2 * end];
+      } else if (std::min(along_m - next[-1], *next - along_m) >= guard_m) {
+        const bool match = colour == scene.bands[static_cast<std::size_t>(next - ends_m.begin() - 1)];
+        ++total, inside += colour != Scene::outside;
+        agreement.matching += match, agreement.wrong += scene.is_ours(colour) && !match;
       }
-    for (int k = 0; k < places; ++k) {
-      const double along_m = length_m * (k + 0.5) / places;
-      const auto is_near = [&](double end_m) { return std::abs(end_m - along_m) < guard_m; };
-      if (std::any_of(ends_m.begin(), ends_m.end(), is_near)) continue;
-      ++total;
-      const std::size_t band = along_m < ends_m[1] ? 0 : along_m < ends_m[2] ? 1 : 2;
-      const std::uint8_t colour = scene.class_on_shaft(base + along_m * axis);
-      if (colour == Scene::outside) continue;
-      const bool match = colour == scene.bands[band];
-      ++inside, matching += match, wrong += scene.is_ours(colour) && !match;
     }
   }
-  const auto fraction = [](int part, int whole) { return whole ? static_cast<double>(part) / whole : 0; };
-  return {fraction(matching, inside), fraction(wrong, inside),
-          std::max(fraction(going_on[0], beyond[0]), fraction(going_on[1], beyond[1])), fraction(inside, total)};
+  for (double* const part : {&agreement.matching, &agreement.wrong}) *part /= std::max(1.0, inside);
+  for (const std::size_t end : {0U, 1U})
+    agreement.beyond = std::max(agreement.beyond, going_on[end] / std::max(1.0, beyond[end]));
+  agreement.in_image = inside / std::max(1.0, total);
+  return agreement;
 }
 
 Status validate(const Scene& scene, const FineFit& fit) {
@@ -133,7 +116,7 @@ Status validate(const Scene& scene, const FineFit& fit) {
   if (agreement.wrong > limits.max_wrong || agreement.beyond > limits.max_beyond || !agrees_well(fit))
     return Status::poor_fit;
   if (scene.registration && !fit.unknowns.through_rcm() && !fit.is_well_seen()) return Status::uncertain;
-  return validate_psi(scene, fit);
+  return validate_psi(scene, agreement, fit);
 }
 
 }  // namespace lapservo::internal

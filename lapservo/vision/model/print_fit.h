@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <optional>
 #include <span>
 
@@ -17,13 +18,20 @@ struct ErrorSize {
   double mm, fraction;
 };
 
+/// Twice the size is half as often: that is assumed of prints made by hand, and no measurement.
+template <std::size_t Count>
+constexpr std::array<ErrorSize, Count> doubled_sizes(double least_mm) {
+  constexpr double fraction_mm = 8e-4;
+  std::array<ErrorSize, Count> sizes{};
+  for (ErrorSize& size : sizes) size = {least_mm, fraction_mm / least_mm}, least_mm *= 2;
+  return sizes;
+}
+
 /// Assumptions about prints. A print is the rig's, or its bands are off by one of these sizes; and, whatever its bands
-/// are, its middle ink may lie aside by one of these. Twice the size is half as often: that is assumed of prints made
-/// by hand, and no measurement.
+/// are, its middle ink may lie aside by one of these.
 struct PrintLimits {
-  std::array<ErrorSize, 7> bands{
-      {{0.01, 0.08}, {0.02, 0.04}, {0.04, 0.02}, {0.08, 0.01}, {0.16, 0.005}, {0.32, 0.0025}, {0.64, 0.00125}}};
-  std::array<ErrorSize, 5> inks{{{0.04, 0.02}, {0.08, 0.01}, {0.16, 0.005}, {0.32, 0.0025}, {0.64, 0.00125}}};
+  std::array<ErrorSize, 7> bands = doubled_sizes<7>(0.01);
+  std::array<ErrorSize, 5> inks = doubled_sizes<5>(0.04);
   /// Each size from off_mm on of prints that were seen to be the rig's, and each beyond a measured print's sigma.
   double fraction_of_known = 1e-4;
   double off_mm = 0.04;      ///< a print is off by this and more

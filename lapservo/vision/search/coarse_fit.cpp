@@ -16,11 +16,13 @@
 #include "lapservo/vision/model/normal_equations.h"
 #include "lapservo/vision/search/heaviest_stretch.h"
 #include "lapservo/vision/search/line_segmentation.h"
+#include "lapservo/vision/shaft/sampled_surface.h"
 
 namespace lapservo::internal {
 namespace {
 
-constexpr int line_count = 13, station_count = 15, samples_along = 128;
+constexpr int line_count = SampledSurface::line_count, station_count = 15;
+constexpr std::size_t samples_along = SampledSurface::samples_along;
 constexpr int max_reach = 200;      // samples on each side of a section's middle
 constexpr double max_hidden = 0.8;  // of a section of the shaft: what the image's border leaves must have a side
 
@@ -92,38 +94,9 @@ SidePoints measure_sides(const Scene& scene, const ShaftPose& pose, const Cylind
   return points;
 }
 
-// Lines along the shaft, sampled evenly in metres from the marker's proximal end.
-struct SampledLine {
-  double azimuth_rad;
-  std::array<std::uint8_t, samples_along> classes;
-};
-struct SampledSurface {
-  double first_m, step_m;
-  std::array<SampledLine, line_count> lines;
-};
-
-SampledSurface sample_surface(const Scene& scene, const ShaftPose& pose, const CylinderView& view, double reach) {
-  SampledSurface surface;
-  const double length_m = scene.marker.length_m();
-  surface.first_m = -reach * length_m;
-  surface.step_m = (1 + 2 * reach) * length_m / samples_along;
-  const Eigen::Vector3d axis = pose.camera_from_unrolled.rotation * Eigen::Vector3d::UnitZ();
-  for (int i = 0; i < line_count; ++i) {
-    SampledLine& line = surface.lines[static_cast<std::size_t>(i)];
-    const double fraction = coarse_fit_limits.line_reach * (2.0 * i / (line_count - 1) - 1);
-    line.azimuth_rad = view.facing_azimuth_rad + fraction * view.half_visible_rad;
-    const Eigen::Vector3d base = point_on(pose, scene.marker, line.azimuth_rad, 0);
-    for (int k = 0; k < samples_along; ++k) {
-      const Eigen::Vector3d point = base + (surface.first_m + (k + 0.5) * surface.step_m) * axis;
-      line.classes[static_cast<std::size_t>(k)] = scene.class_on_shaft(point);
-    }
-  }
-  return surface;
-}
-
 BoundaryPoints measure_boundaries(const Scene& scene, const ShaftPose& pose, const SampledSurface& surface) {
   BoundaryPoints points;
-  for (const SampledLine& line : surface.lines) {
+  for (const SampledSurface::Line& line : surface.lines) {
     const LineSegmentation split = segment_line(line.classes, scene.bands);
     for (std::size_t k = 0; k < 4; ++k) {
       if (!split.seen[k]) continue;
@@ -202,7 +175,7 @@ class RotationScore {
   RotationScore(const Scene& scene, const SampledSurface& surface) : scene_(scene), surface_(surface) {
     const auto upper_m = boundaries_m(scene.marker, 0), slopes_m = boundary_slopes_m(scene.marker);
     for (std::size_t k = 0; k < 4; ++k) {
-      upper_[k] = (upper_m[k] - surface.first_m) / surface.step_m + 0.5;
+      upper_[k] = surface.samples_before(upper_m[k]) + 0.5;
       slope_[k] = slopes_m[k] / surface.step_m;
     }
     for (std::size_t i = 0; i < line_count; ++i) {
@@ -271,7 +244,8 @@ CoarseFit fit_coarsely(const Scene& scene, PoseUnknowns start, Rotation rotation
     if (!view) return fit;
     const double narrowing = round == 0 ? 1 : 0.5;
     const auto sides = measure_sides(scene, fit.unknowns.pose(), *view, narrowing * coarse_fit_limits.lateral_reach_px);
-    const auto surface = sample_surface(scene, fit.unknowns.pose(), *view, narrowing * coarse_fit_limits.along_reach);
+    const SampledSurface surface(scene, fit.unknowns.pose(), *view,
+                                 narrowing * coarse_fit_limits.along_reach * scene.marker.length_m());
     const auto boundaries = measure_boundaries(scene, fit.unknowns.pose(), surface);
     if (boundaries.size() < coarse_fit_limits.min_boundaries || sides.size() < coarse_fit_limits.min_sides) return fit;
     if (round == 1) {

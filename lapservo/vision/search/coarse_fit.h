@@ -15,7 +15,6 @@ struct CoarseFitLimits {
   /// How far the first round looks, beyond the predicted silhouettes and, in marker lengths, beyond the ends; the
   /// second half as far.
   double lateral_reach_px = 24, along_reach = 0.25;
-  double line_reach = 0.74;         ///< of the visible half angle: beyond, bands are too foreshortened and dark
   std::size_t min_boundaries = 10;  ///< points, of 52 (four on 13 lines)
   std::size_t min_sides = 4;        ///< points, of 30
   /// A section's stretch of colour by the shaft's expected width: less is blood's remainder, more is tissue's.

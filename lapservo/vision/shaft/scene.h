@@ -42,18 +42,6 @@ struct Scene {
     const std::uint8_t colour = class_at(raw_px);
     return others.empty() ? colour : unless_explained(raw_px, colour);
   }
-  /// The same at a point before the camera, [m] in its frame; `outside` also when it lies behind it or is hidden.
-  std::uint8_t class_at_point(const Eigen::Vector3d& point_in_camera) const {
-    if (!field.contains(point_in_camera)) return outside;
-    const Eigen::Vector2d raw_px = camera.raw_from_point(point_in_camera);
-    return hidden(raw_px, point_in_camera.z()) ? outside : class_beside(raw_px);
-  }
-  /// The same of a point that would hide another instrument behind it.
-  std::uint8_t class_on_shaft(const Eigen::Vector3d& point_in_camera) const {
-    if (!field.contains(point_in_camera)) return outside;
-    const Eigen::Vector2d raw_px = camera.raw_from_point(point_in_camera);
-    return hidden(raw_px, point_in_camera.z()) ? outside : class_at(raw_px);
-  }
   /// Whether another instrument lies before what would be seen there at this depth (z in the camera's frame).
   bool hidden(const Eigen::Vector2d& raw_px, double depth_m) const {
     return !others.empty() && hidden_by_others(raw_px, depth_m);

@@ -1,4 +1,4 @@
-#include "lapservo/vision/shaft/scene.h"
+#include "lapservo/vision/shaft/sampled_surface.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 namespace lapservo::internal {
 namespace {
 
-TEST(Scene, ShowsNoPointThatTheLensFoldsIntoTheImage) {
+TEST(LineInImage, ShowsNoPointThatTheLensFoldsIntoTheImage) {
   Rig rig = scenes::usual_rig();
   rig.camera.distortion = {-0.3, 0, 0, 0, 0};
   const scenes::Sight sight(rig, cv::Mat(rig.camera.height_px, rig.camera.width_px, CV_8UC3, cv::Scalar(20, 200, 20)));
@@ -16,10 +16,13 @@ TEST(Scene, ShowsNoPointThatTheLensFoldsIntoTheImage) {
   const std::uint8_t colour = scene.class_at({400, 300});
   for (const Eigen::Vector3d& point : {ahead, aside})
     EXPECT_EQ(scene.class_at(rig.camera.raw_from_point(point)), colour);
-  EXPECT_EQ(scene.class_at_point(ahead), colour);
-  EXPECT_EQ(scene.class_on_shaft(ahead), colour);
-  EXPECT_EQ(scene.class_at_point(aside), Scene::outside);
-  EXPECT_EQ(scene.class_on_shaft(aside), Scene::outside);
+  const auto shows = [&](const Eigen::Vector3d& point, bool on_shaft) {
+    return LineInImage<1>(scene, point, Eigen::Vector3d::Zero()).pixel(0, on_shaft) != nullptr;
+  };
+  for (const bool on_shaft : {false, true}) {
+    EXPECT_TRUE(shows(ahead, on_shaft));
+    EXPECT_FALSE(shows(aside, on_shaft));
+  }
 }
 
 }  // namespace

@@ -1,0 +1,84 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include <Eigen/Core>
+
+#include "lapservo/geometry/cylinder.h"
+#include "lapservo/vision/shaft/scene.h"
+#include "lapservo/vision/shaft/shaft_pose.h"
+
+namespace lapservo::internal {
+
+/// Places along a line in the camera's frame and their pixels: the k-th is base + (k + 0.5) * step [m]. All are
+/// projected at once, in vectors: half of what a search for hidden markers costs is this.
+template <std::size_t Count>
+class LineInImage {
+ public:
+  static constexpr std::size_t count = Count;
+
+  LineInImage(const Scene& scene, const Eigen::Vector3d& base, const Eigen::Vector3d& step) : scene_(scene) {
+    const Camera& camera = scene.camera;
+    for (std::size_t k = 0; k < count; ++k) {
+      const double steps = static_cast<double>(k) + 0.5;
+      const double inverse_z = 1 / (depth_m_[k] = base.z() + steps * step.z());
+      u_px_[k] = camera.cx_px + camera.fx_px * (base.x() + steps * step.x()) * inverse_z;
+      v_px_[k] = camera.cy_px + camera.fy_px * (base.y() + steps * step.y()) * inverse_z;
+    }
+    if (!camera.distorted()) return;
+    for (std::size_t k = 0; k < count; ++k) {
+      if (!scene.field.contains(base + (static_cast<double>(k) + 0.5) * step)) depth_m_[k] = 0;
+      const Eigen::Vector2d raw_px = camera.raw_from_ideal({u_px_[k], v_px_[k]});
+      u_px_[k] = raw_px.x(), v_px_[k] = raw_px.y();
+    }
+  }
+
+  /// Nullptr where the image says nothing of it: beyond its border, where another instrument hides it or, beside the
+  /// shaft, where another one's marker shows.
+  const std::uint8_t* pixel(std::size_t k, bool on_shaft) const {
+    const double u = u_px_[k] + 0.5, v = v_px_[k] + 0.5;
+    if (!(depth_m_[k] > 1e-3 && u >= 0 && v >= 0 && u < scene_.image.width_px && v < scene_.image.height_px))
+      return nullptr;
+    if (!scene_.others.empty()) {
+      const Eigen::Vector2d raw_px(u_px_[k], v_px_[k]);
+      if (scene_.hidden(raw_px, depth_m_[k]) || (!on_shaft && scene_.class_beside(raw_px) == Scene::outside))
+        return nullptr;
+    }
+    return scene_.image.pixel(static_cast<int>(u), static_cast<int>(v));
+  }
+
+ private:
+  const Scene& scene_;
+  std::array<double, Count> u_px_, v_px_, depth_m_;
+};
+
+/// Colour classes along lines of a shaft's visible surface.
+struct SampledSurface {
+  static constexpr std::size_t samples_along = 128;
+  static constexpr int line_count = 13;
+  /// Of the visible half angle: beyond, bands are too foreshortened and dark.
+  static constexpr double reach = 0.74;
+  struct Line {
+    double azimuth_rad;
+    std::array<std::uint8_t, samples_along> classes;  ///< Scene::outside where the image says nothing of the shaft
+  };
+
+  /// From `beyond_m` before the marker's proximal end to as far behind its distal one.
+  SampledSurface(const Scene& scene, const ShaftPose& pose, const CylinderView& view, double beyond_m);
+
+  /// Of a sample, from the proximal end; and samples, with a fraction, before a place.
+  double along_m(std::size_t sample) const { return first_m + (static_cast<double>(sample) + 0.5) * step_m; }
+  double samples_before(double along_m) const { return (along_m - first_m) / step_m; }
+  /// Of the nearest sample.
+  std::uint8_t class_at(const Line& line, double along_m) const {
+    return line.classes[static_cast<std::size_t>(std::clamp(samples_before(along_m), 0.0, samples_along - 1.0))];
+  }
+
+  double first_m, step_m;
+  std::array<Line, line_count> lines;
+};
+
+}  // namespace lapservo::internal
