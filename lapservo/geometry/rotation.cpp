@@ -32,4 +32,9 @@ Eigen::Vector3d rotation_vector_of(const Eigen::Quaterniond& rotation) {
   return turn.angle() * turn.axis();
 }
 
+double roll_between_rad(const Eigen::Quaterniond& from, const Eigen::Quaterniond& to) {
+  const Eigen::Matrix3d turn = (from.conjugate() * to).toRotationMatrix();
+  return std::atan2(turn(1, 0) - turn(0, 1), turn(0, 0) + turn(1, 1));
+}
+
 }  // namespace lapservo::internal

@@ -13,4 +13,7 @@ Eigen::Quaterniond rotation_between(const Eigen::Vector3d& from, const Eigen::Ve
 Eigen::Quaterniond rotation_by(const Eigen::Vector3d& vector_rad);
 Eigen::Vector3d rotation_vector_of(const Eigen::Quaterniond& rotation);
 
+/// By how much a frame is turned about its z axis against another one whose z points nearly the same way.
+double roll_between_rad(const Eigen::Quaterniond& from, const Eigen::Quaterniond& to);
+
 }  // namespace lapservo::internal

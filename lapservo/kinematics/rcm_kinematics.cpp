@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "lapservo/geometry/rotation.h"
+
 namespace lapservo {
 
 Eigen::Vector3d shaft_axis_in_rcm(const JointVector& q) {
@@ -31,6 +33,15 @@ std::optional<JointVector> configuration_through(const Rigid3& camera_from_rcm,
   const double rho_m = arm.norm();
   if (!(rho_m > 1e-3)) return std::nullopt;
   return JointVector{std::atan2(arm.y(), arm.x()), std::acos(std::clamp(arm.z() / rho_m, -1.0, 1.0)), rho_m, 0};
+}
+
+std::optional<JointVector> configuration_of_marker(const Marker& marker, const Rigid3& camera_from_rcm,
+                                                   const Rigid3& seen_camera_from_marker) {
+  auto q = configuration_through(camera_from_rcm, seen_camera_from_marker.translation);
+  if (!q) return std::nullopt;
+  const Rigid3 unturned = camera_from_marker(marker, camera_from_rcm, *q);
+  q->psi_rad = internal::roll_between_rad(unturned.rotation, seen_camera_from_marker.rotation);
+  return q;
 }
 
 }  // namespace lapservo

@@ -27,4 +27,8 @@ Rigid3 camera_from_marker(const Marker& marker, const Rigid3& camera_from_rcm, c
 std::optional<JointVector> configuration_through(const Rigid3& camera_from_rcm,
                                                  const Eigen::Vector3d& proximal_end_in_camera);
 
+/// The same with the marker's rotation.
+std::optional<JointVector> configuration_of_marker(const Marker& marker, const Rigid3& camera_from_rcm,
+                                                   const Rigid3& seen_camera_from_marker);
+
 }  // namespace lapservo

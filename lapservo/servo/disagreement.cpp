@@ -9,7 +9,6 @@
 #include <fmt/format.h>
 
 #include "lapservo/core/angles.h"
-#include "lapservo/geometry/rotation.h"
 #include "lapservo/kinematics/rcm_kinematics.h"
 
 namespace lapservo::internal {
@@ -87,9 +86,8 @@ ArmNumbers start_of(const Hypothesis& hypothesis, const ArmData& data) {
   const int i = hypothesis.joint;
   if (hypothesis.cause != Cause::sign && hypothesis.cause != Cause::offset) return x;
   const MarkerSighting& seen = data.sightings.back();
-  auto q = configuration_through(data.camera_from_rcm, seen.camera_from_marker.translation).value_or(JointVector{});
-  const Rigid3 unturned = camera_from_marker(data.marker, data.camera_from_rcm * rcm_from_unrolled(q), 0);
-  q.psi_rad = rotation_vector_of(unturned.rotation.conjugate() * seen.camera_from_marker.rotation).z();
+  const JointVector q =
+      configuration_of_marker(data.marker, data.camera_from_rcm, seen.camera_from_marker).value_or(JointVector{});
   const double off = q.vector()[i] - (hypothesis.mirrored ? -1 : 1) * seen.q[i];
   x[i] = i == 2 ? off : wrap_pi(off);
   return x;

@@ -21,11 +21,8 @@ namespace {
 std::optional<std::array<double, 4>> readings_at(const Marker& marker, const Rigid3& camera_from_rcm,
                                                  const Joints& joints, const TimedPose& pose,
                                                  const std::array<double, 4>& read) {
-  auto q = configuration_through(camera_from_rcm, pose.origin());
+  const auto q = configuration_of_marker(marker, camera_from_rcm, pose.marker.camera_from_marker);
   if (!q) return std::nullopt;
-  const Rigid3 unturned = camera_from_marker(marker, camera_from_rcm * rcm_from_unrolled(*q), 0);
-  const Eigen::Quaterniond turn = unturned.rotation.conjugate() * pose.marker.camera_from_marker.rotation;
-  q->psi_rad = 2 * std::atan2(turn.z(), turn.w());
   const Eigen::Vector4d at = joints_from_q(joints, q->vector());
   return std::array{read[0] + wrap_pi(at[0] - read[0]), at[1], at[2], read[3] + wrap_pi(at[3] - read[3])};
 }

@@ -11,6 +11,7 @@
 
 #include "lapservo/core/angles.h"
 #include "lapservo/core/statistics.h"
+#include "lapservo/geometry/rotation.h"
 #include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/rig/joint_conversion.h"
 
@@ -84,9 +85,7 @@ std::complex<double> mean_turn(const std::vector<TimedPose>& poses, const std::v
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const auto q = JointVector::from_vector(q_from_joints(guess.joints, Eigen::Vector4d(joints[i].data())));
     const Rigid3 unturned = camera_from_marker(marker, guess.camera_from_rcm * rcm_from_unrolled(q), 0);
-    const Eigen::Matrix3d turn =
-        (unturned.rotation.conjugate() * poses[i].marker.camera_from_marker.rotation).toRotationMatrix();
-    const double psi_rad = std::atan2(turn(1, 0) - turn(0, 1), turn(0, 0) + turn(1, 1));
+    const double psi_rad = roll_between_rad(unturned.rotation, poses[i].marker.camera_from_marker.rotation);
     sum += std::polar(1.0, psi_rad - sign * joints[i][3]);
   }
   return sum / static_cast<double>(poses.size());

@@ -5,6 +5,7 @@
 
 #include "lapservo/core/angles.h"
 #include "lapservo/geometry/cylinder.h"
+#include "lapservo/geometry/rotation.h"
 #include "lapservo/marker/azimuths.h"
 
 namespace lapservo::internal {
@@ -13,11 +14,6 @@ std::optional<double> facing_tau_rad(const Marker& marker, const ShaftPose& pose
   const auto view = view_cylinder(pose.camera_from_unrolled, marker.radius_m());
   if (!view) return std::nullopt;
   return wrap_two_pi(marker_azimuth_rad(marker, view->facing_azimuth_rad, pose.psi_rad));
-}
-
-double roll_between_rad(const Eigen::Quaterniond& from, const Eigen::Quaterniond& to) {
-  const Eigen::Matrix3d turn = (from.conjugate() * to).toRotationMatrix();
-  return std::atan2(turn(1, 0) - turn(0, 1), turn(0, 0) + turn(1, 1));
 }
 
 ShaftPose in_azimuths_of(const ShaftPose& pose, double psi_rad) {

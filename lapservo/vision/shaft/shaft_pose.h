@@ -21,9 +21,6 @@ struct ShaftPose {
 /// shaft.
 std::optional<double> facing_tau_rad(const Marker& marker, const ShaftPose& pose);
 
-/// By how much a frame is turned about the shaft's axis against another one whose z points nearly the same way.
-double roll_between_rad(const Eigen::Quaterniond& from, const Eigen::Quaterniond& to);
-
 /// The same pose in the unrolled frame of another turn about the axis, in which psi is this.
 ShaftPose in_azimuths_of(const ShaftPose& pose, double psi_rad);
 
