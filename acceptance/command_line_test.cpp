@@ -660,7 +660,7 @@ TEST_F(CommandLine, CalibrateRegistrationWritesWhereTheArmStands) {
   EXPECT_EQ(run(calibrate + " --joints " + in("other.csv", "time_s,a,b,c,d\n0,1,2,3,4\n1,1,2,3,4\n")), 2);
   expect_in(errors(), "yaw");
 #ifdef LAPSERVO_TEST_BAGS
-  write_bags_of("swing", fps, CsvTable::read("in/joints.csv"));
+  write_bags_of("swing", fps, CsvTable::read("in/with_wrist.csv"));
   for (const std::string bag : {"in/run.bag", "in/run"}) {
     expect_tracked_as("out/bound.csv", bag, "out/rig.yaml");
     expect_done("calibrate registration " + bag + " --rig " + unregistered + " --out out/bag.yaml");
@@ -672,6 +672,11 @@ TEST_F(CommandLine, CalibrateRegistrationWritesWhereTheArmStands) {
   expect_in(output(), "72 images and the joints; nothing was sent");
   EXPECT_EQ(output().find("not_following"), std::string::npos) << output();
   expect_done("servo --replay out/decided/log.csv");
+  // A goal of the tip needs the wrist as it was recorded.
+  expect_done("track in/run.bag --fps 8 --rig " + with_tool + " --out out/tip.csv");
+  const CsvTable tip = CsvTable::read("out/tip.csv");
+  expect_done(decide + with_tool + " --tip " + tip.text(0, "tip_x_m") + "," + tip.text(0, "tip_y_m") + "," +
+              tip.text(0, "tip_z_m"));
   const CsvTable decided = CsvTable::read("out/decided/log.csv");
   EXPECT_EQ(run(decide + "out/rig.yaml --out out/decided"), 2);
   EXPECT_EQ(run(decide + "out/rig.yaml --enable-motion"), 2);

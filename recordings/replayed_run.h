@@ -22,10 +22,10 @@ namespace lapservo::internal {
 class ReplayedRun {
  public:
   /// `images`: the topic of the frames; nullptr where they have the times of the recorder's clock. `joint_topic`: see
-  /// bag_topics.h. `arm`: the instrument's name. Throws InputError for bags without joints, and where the joints end
-  /// before the first image.
+  /// bag_topics.h. `instrument`: with joints. `wrist`: those of its tool, by the clock of the arm, where they are
+  /// known. Throws InputError for bags without joints, and where the joints end before the first image.
   ReplayedRun(std::unique_ptr<FrameSource> frames, const Bag& bag, const BagTopic* images,
-              const std::string& joint_topic, const std::string& arm, const Joints& joints);
+              const std::string& joint_topic, const Instrument& instrument, std::optional<JointRecording> wrist);
 
   /// Begins where joints and images do, and passes while somebody sleeps.
   Clock& clock() { return clock_; }
@@ -50,8 +50,13 @@ class ReplayedRun {
     void sleep_until(double time_s) override { now = std::max(now, time_s); }
     double now;
   };
+  struct ShiftedJoints {
+    JointRecording recording;
+    double lead_s = 0;
+  };
   struct RecordedArm : Robot {
-    RecordedArm(const JointRecording& recording, const Joints& joints, const Clock& of_run);
+    RecordedArm(const ShiftedJoints& joints, const Instrument& instrument, std::optional<JointRecording> of_wrist,
+                const Clock& of_run);
     std::vector<JointReading> readings() override;
     JointState state() override;
     void send(const JointPath&) override {}
@@ -59,6 +64,9 @@ class ReplayedRun {
     const Clock& clock;
     std::vector<JointReading> all;
     std::size_t next = 0;
+    std::optional<JointRecording> wrist;  // by the arm's clock, which is ahead
+    std::size_t wrist_joints;
+    double lead_s;
   };
   struct RecordedImages : ImageStream {
     RecordedImages(FrameSource& of_bag, const Clock& of_run) : frames(of_bag), clock(of_run), next(of_bag.next()) {}
@@ -67,10 +75,6 @@ class ReplayedRun {
     const Clock& clock;
     std::optional<Frame> next;
     int count = 0;
-  };
-  struct ShiftedJoints {
-    JointRecording recording;
-    double lead_s = 0;
   };
   static ShiftedJoints joints_of_bag(const Bag& bag, const BagTopic* images, double begin_s, const std::string& topic,
                                      const std::string& arm, const Joints& joints);

@@ -8,6 +8,7 @@
 #include "lapservo/control/motion_limits.h"
 #include "lapservo/core/printable.h"
 #include "lapservo/crtk/joint_map.h"
+#include "lapservo/tool/wrist.h"
 
 namespace lapservo::internal {
 namespace {
@@ -56,6 +57,15 @@ bool lies_between(const Eigen::Vector4d& q, const Eigen::Vector4d& from, const E
 }
 
 }  // namespace
+
+InterlockConfig interlock_of(const Instrument& instrument, const JointLimits& limits_of_q, bool motion_enabled,
+                             std::size_t max_readers) {
+  InterlockConfig config{.joints = instrument.joints.value(), .limits = limits_of_q};
+  config.motion_enabled = motion_enabled;
+  config.max_readers = max_readers;
+  config.wrist = wrist_names(instrument.tool);
+  return config;
+}
 
 Interlock::Interlock(const InterlockConfig& config)
     : config_(config), measured_clock_(config.max_age_s), setpoint_clock_(config.max_age_s) {}

@@ -34,6 +34,10 @@ struct InterlockConfig {
   std::vector<std::string> wrist{};
 };
 
+/// For the arm of an instrument that has `joints`.
+InterlockConfig interlock_of(const Instrument& instrument, const JointLimits& limits_of_q, bool motion_enabled,
+                             std::size_t max_readers);
+
 /// Counts of dropped and withheld messages.
 struct InterlockCounts {
   long joint_states = 0, set_points = 0;  ///< taken in; sent

@@ -45,7 +45,7 @@ void TipGoals::refuse_incomplete(const std::string& source, bool has_joints) con
   if (!rig_.instruments[0].camera_from_rcm) refuse("the rig's camera_from_rcm");
   if (!tool || !tool->place) refuse("the rig's `tool` with its place");
   if (!has_joints || wrist_.size() == tool->wrist.size()) return;
-  refuse(fmt::format("the wrist's joints, but the arm does not measure {}", fmt::join(wrist_names(*tool), ", ")));
+  refuse(fmt::format("the wrist's joints, but the arm does not measure {}", fmt::join(wrist_names(tool), ", ")));
 }
 
 void TipGoals::use(const std::optional<Rigid3>& camera_from_rcm) {

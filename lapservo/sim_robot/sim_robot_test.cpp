@@ -10,7 +10,6 @@
 #include "lapservo/crtk/test_transport.h"
 #include "lapservo/testing/rigs.h"
 #include "lapservo/testing/wait_for.h"
-#include "lapservo/tool/wrist.h"
 
 namespace lapservo::internal {
 namespace {
@@ -20,11 +19,8 @@ class Room {
  public:
   explicit Room(const Rig& scene = testing::small_test_rig(), double wrist_swing_rad = 0)
       : rig(scene), simulator(rig, simulated(wrist_swing_rad), {0.05, 1.57, 0.064, 1.2}) {
-    InterlockConfig config;
-    if (rig.instruments[0].tool) config.wrist = wrist_names(*rig.instruments[0].tool);
-    config.joints = default_joints();
-    config.motion_enabled = true;
-    interlock.emplace(config);
+    rig.instruments[0].joints = default_joints();
+    interlock.emplace(interlock_of(rig.instruments[0], {}, true, 1));
     robot.emplace(transport, rig, simulator, SimRobotConfig{});
     subscriptions.push_back(transport.subscribe_joints(
         "/PSM1/measured_js", [this](JointMessage&& message) { interlock->on_measured(message, now_s); }));

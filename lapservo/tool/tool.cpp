@@ -57,9 +57,10 @@ Covariance place_covariance(const Tool::PlaceCovariance& place, const Motion& by
 
 }  // namespace
 
-std::vector<std::string> internal::wrist_names(const Tool& tool) {
+std::vector<std::string> internal::wrist_names(const std::optional<Tool>& tool) {
   std::vector<std::string> names;
-  for (const WristJoint& joint : tool.wrist) names.push_back(joint.name);
+  if (!tool) return names;
+  for (const WristJoint& joint : tool->wrist) names.push_back(joint.name);
   return names;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -9,8 +10,8 @@
 
 namespace lapservo::internal {
 
-/// The names of the wrist's joints, from the shaft to the tip; none for a straight tool.
-std::vector<std::string> wrist_names(const Tool& tool);
+/// The names of the wrist's joints, from the shaft to the tip; none for a straight tool and without a tool.
+std::vector<std::string> wrist_names(const std::optional<Tool>& tool);
 
 /// Throws InputError for another number of readings than the wrist has joints, and for one that is not finite.
 void expect_wrist(const Tool& tool, std::span<const double> wrist_rad);

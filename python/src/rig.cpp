@@ -182,10 +182,7 @@ q = sign * joints + offset, rad and m.)");
           "image_delay_s", [](const Instrument& instrument) { return instrument.image_delay_s; },
           "a frame's stamp minus the joints' clock at its exposure, or None")
       .def_property_readonly(
-          "wrist_joints",
-          [](const Instrument& instrument) {
-            return instrument.tool ? internal::wrist_names(*instrument.tool) : std::vector<std::string>();
-          },
+          "wrist_joints", [](const Instrument& instrument) { return internal::wrist_names(instrument.tool); },
           "list[str]: the joints of the tool's wrist, in the order of Tracker.set_wrist; empty for a straight tool")
       .def("__repr__", [](const Instrument& instrument) { return "<lapservo.Instrument '" + instrument.name + "'>"; });
 }

@@ -98,12 +98,11 @@ void wait_for_joints(Ros2Robot& robot, const std::string& arm, double wait_s) {
 std::unique_ptr<Ros2Robot> make_robot(const std::string& arm, const Rig& rig, const Controller& controller,
                                       const SteadyClock& clock, bool enable_motion, std::size_t setpoint_readers,
                                       double wait_s) {
-  const auto& joints = rig.instruments.front().joints;
-  if (!joints) throw InputError("Ros2Robot", "rig", "without joints", "the arm's joints: names, sign, offset");
-  InterlockConfig interlock{.joints = *joints, .limits = controller.limits};
-  interlock.motion_enabled = enable_motion;
-  interlock.max_readers = setpoint_readers;
-  auto robot = std::make_unique<Ros2Robot>(arm, interlock, clock);
+  const Instrument& instrument = rig.instruments.front();
+  if (!instrument.joints)
+    throw InputError("Ros2Robot", "rig", "without joints", "the arm's joints: names, sign, offset");
+  auto robot = std::make_unique<Ros2Robot>(
+      arm, interlock_of(instrument, controller.limits, enable_motion, setpoint_readers), clock);
   wait_for_joints(*robot, arm, wait_s);
   return robot;
 }

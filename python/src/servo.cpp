@@ -89,21 +89,24 @@ class PythonImageStream : public ImageStream {
 void bind_ports(py::module_& m) {
   py::class_<JointState>(m, "JointState", "State of an arm.")
       .def(py::init([](const Number<"time_s", Numbers::any>& time_s, const Array<"q", 4, 1, Numbers::any>& q,
-                       const std::string& operating_state, bool follows, bool started, const std::string& blocked) {
-             return JointState{time_s.value,
-                               JointVector::from_vector(q.value),
-                               operating_state_of(operating_state),
-                               follows,
-                               started,
-                               blocked_of(blocked)};
+                       const std::string& operating_state, bool follows, bool started, const std::string& blocked,
+                       const std::vector<double>& wrist_rad) {
+             return JointState{.time_s = time_s.value,
+                               .q = JointVector::from_vector(q.value),
+                               .operating_state = operating_state_of(operating_state),
+                               .follows = follows,
+                               .started = started,
+                               .blocked = blocked_of(blocked),
+                               .wrist_rad = wrist_rad};
            }),
            py::arg("time_s"), py::arg("q"), py::arg("operating_state") = "ENABLED", py::arg("follows") = true,
-           py::arg("started") = false, py::arg("blocked") = "none",
+           py::arg("started") = false, py::arg("blocked") = "none", py::arg("wrist_rad") = std::vector<double>(),
            "time_s: when the joints were read, on the loop's clock; q: float[4], theta, phi [rad], rho [m], psi [rad]; "
            "operating_state: CRTK's word; follows: False where nothing that is sent moves the arm, and the loop only "
            "says "
            "what it would do; started: the operator has said start since the last state, which a held loop waits for; "
-           "blocked: why else the arm must not be moved, for example 'busy' or 'not_homed'.")
+           "blocked: why else the arm must not be moved, for example 'busy' or 'not_homed'; wrist_rad: readings of the "
+           "instrument's wrist_joints, in their order, without which its tip is not known.")
       .def_readonly("time_s", &JointState::time_s)
       .def_property_readonly(
           "q", [](const JointState& self) { return self.q.vector(); }, "float[4]")
@@ -111,7 +114,8 @@ void bind_ports(py::module_& m) {
                              [](const JointState& self) { return std::string(to_string(self.operating_state)); })
       .def_readonly("follows", &JointState::follows)
       .def_readonly("started", &JointState::started)
-      .def_property_readonly("blocked", [](const JointState& self) { return std::string(to_string(self.blocked)); });
+      .def_property_readonly("blocked", [](const JointState& self) { return std::string(to_string(self.blocked)); })
+      .def_readonly("wrist_rad", &JointState::wrist_rad, "list[float]; empty where the arm does not measure them");
 
   py::class_<JointPath>(m, "JointPath",
                         R"(Setpoints over time. Where no newer path comes it brakes to rest by itself.)")

@@ -38,6 +38,8 @@ def test_the_tip_follows_the_wrist(rig, image):
     assert np.allclose(tip.camera_from_tip[:3, 3], (seen.marker_pose.camera_from_marker @ [0, 0, 0.04, 1])[:3])
     assert np.all(np.linalg.eigvalsh(tip.covariance) > 0) and np.isclose(tip.sigma_m**2, np.trace(tip.covariance[:3, :3]))
     assert np.isclose(tip.sigma_readings_m, 0.01 * np.pi / 180) and tip.sigma_place_m == 0 < tip.sigma_shaft_m
+    assert lapservo.JointState(0, Q, wrist_rad=[0.5]).wrist_rad == [0.5] and lapservo.JointState(0, Q).wrist_rad == []
+    assert lapservo.Simulator(wristed, Q).state().wrist_rad == pytest.approx([0.1])
     assert pickle.loads(pickle.dumps(seen)) == seen and pickle.loads(pickle.dumps(wristed)) == wristed
     for readings in ([1.0, 2.0], [np.nan]):
         with pytest.raises(lapservo.InputError):

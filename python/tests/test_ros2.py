@@ -80,6 +80,15 @@ def test_without_motion_enabled_nothing_is_sent_and_a_goal_that_can_not_be_reach
     assert np.abs(robot.state().q - before.q).max() < 1e-3
 
 
+def test_the_wrist_of_the_rigs_tool_is_read(theatre, rig):
+    joint = ("    tool: {joints: [{name: wrist_pitch, alpha_rad: -1.57}], tip_in_last_joint_m: [0.01, 0, 0], "
+             "wrist_in_marker_m: [0, 0, 0.03], azimuth_rad: 0}\n")
+    clock = lapservo.SteadyClock()
+    for of, expected in ((rig, []), (lapservo.Rig.parse(rig.to_yaml() + joint), [0.1])):
+        robot = lapservo.Ros2Robot("SIM_PSM1", of, lapservo.Controller(of), clock)
+        assert robot.state().wrist_rad == pytest.approx(expected)
+
+
 def test_what_is_not_there_is_said(theatre, rig):
     clock = lapservo.SteadyClock()
     controller = lapservo.Controller(rig)

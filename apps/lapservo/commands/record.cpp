@@ -149,11 +149,9 @@ class MovingArm {
     if (!instrument.joints)
       throw InputError(options.rig,
                        "joints of " + instrument.name + " is missing, expected the arm's joints: names, sign, offset");
-    InterlockConfig config;
-    config.joints = *instrument.joints;
-    config.motion_enabled = options.enable_motion;
-    config.max_readers = static_cast<std::size_t>(options.setpoint_readers);
-    config.limits = limits_of_q(config.joints, load_arm_limits(options.joint_limits));
+    const InterlockConfig config =
+        interlock_of(instrument, limits_of_q(*instrument.joints, load_arm_limits(options.joint_limits)),
+                     options.enable_motion, static_cast<std::size_t>(options.setpoint_readers));
     // Refused now where there is no room for it, wherever the arm is.
     if (options.move == "turn") turn_motion(Eigen::Vector4d::Zero(), config.limits, options.joint_limits);
     return config;

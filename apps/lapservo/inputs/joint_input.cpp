@@ -100,7 +100,7 @@ std::string no_tip_text(const Instrument& instrument, bool wrist_is_read) {
     return "the rig does not say where the tool sits behind the marker: lapservo calibrate tip measures it";
   if (instrument.tool->wrist.empty() || wrist_is_read) return "";
   return fmt::format("no readings of the wrist's joints {}: --joints names a recording or topic that has them",
-                     fmt::join(wrist_names(*instrument.tool), ", "));
+                     fmt::join(wrist_names(instrument.tool), ", "));
 }
 
 void add_joint_options(Command command, CalibrateOptions& options, const std::string& help) {

@@ -26,7 +26,6 @@
 #include "lapservo/robot/real_time.h"
 #include "lapservo/robot/steady_clock.h"
 #include "lapservo/robot/supervisor.h"
-#include "lapservo/tool/wrist.h"
 
 namespace lapservo::app {
 using namespace internal;
@@ -150,16 +149,6 @@ std::string wait_for_topics(const ServoOptions& options, Transports& transports,
   return why.empty() ? "" : fmt::format("{}: no images within {:.0f} s: {}", options.camera, wait_s, why);
 }
 
-InterlockConfig interlock_of(const ServoOptions& options, const RunConfig& config) {
-  InterlockConfig interlock;
-  interlock.joints = joints_of(options, config.rig);
-  if (const auto& tool = config.rig.instruments.front().tool) interlock.wrist = wrist_names(*tool);
-  interlock.limits = config.controller.limits;
-  interlock.motion_enabled = options.enable_motion;
-  interlock.max_readers = static_cast<std::size_t>(options.setpoint_readers);
-  return interlock;
-}
-
 void say_counts(const InterlockCounts& arm, const ImageCounts& images) {
   std::printf("%ld joint states; setpoints: %ld sent, %ld withheld; dropped: %ld malformed, %ld repeated, %ld late, ",
               arm.joint_states, arm.set_points, arm.withheld, arm.malformed, arm.repeated, arm.late);
@@ -177,7 +166,10 @@ int steer_arm(const ServoOptions& options) {
   if (options.enable_motion) require_joint_limits("--enable-motion", options.joint_limits);
   RunConfig config = run_config_of(options);
   const Rig rig = config.rig;
-  const InterlockConfig interlock = interlock_of(options, config);
+  joints_of(options, rig);  // throws where the rig has none
+  const InterlockConfig interlock =
+      interlock_of(rig.instruments.front(), config.controller.limits, options.enable_motion,
+                   static_cast<std::size_t>(options.setpoint_readers));
   if (!options.endoscope.empty() &&
       (config.controller.mode != ControlMode::fused || !rig.instruments.front().camera_from_rcm))
     throw InputError("--endoscope", "needs camera_from_rcm in the rig and --method default");

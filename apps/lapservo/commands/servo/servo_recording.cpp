@@ -11,6 +11,7 @@
 #include "apps/lapservo/cli/progress.h"
 #include "apps/lapservo/commands/servo/run_watcher.h"
 #include "apps/lapservo/inputs/frame_input.h"
+#include "apps/lapservo/inputs/joint_input.h"
 #include "recordings/bag_topics.h"
 #include "recordings/open_bag.h"
 #include "recordings/replayed_run.h"
@@ -59,8 +60,14 @@ int decide_on_recording(const ServoOptions& options) {
   } else {
     say_remark(path, bag->remark());
   }
-  ReplayedRun recorded(open_frames(options.replay, options.recorded, &rig.camera), *bag, images, options.joint_topic,
-                       rig.instruments.front().name, joints_of(options, rig));
+  const Instrument& instrument = rig.instruments.front();
+  joints_of(options, rig);  // throws where the rig has none
+  auto frames = open_frames(options.replay, options.recorded, &rig.camera);
+  auto wrist = find_wrist_input(options.replay, "", options.joint_topic, instrument, frames.get());
+  if (const std::string why = no_tip_text(instrument, wrist.has_value()); !why.empty())
+    say_remark(options.replay, "no tip: " + why);
+  ReplayedRun recorded(std::move(frames), *bag, images, options.joint_topic, instrument,
+                       wrist ? std::optional(std::move(wrist->recording)) : std::nullopt);
   if (const double lead_s = recorded.arm_clock_lead_s(); std::abs(lead_s) > 0.3)
     std::printf("the arm's clock is %.2f s %s the camera's, by when both were recorded\n", std::abs(lead_s),
                 lead_s > 0 ? "ahead of" : "behind");
