@@ -96,9 +96,10 @@ std::string LivePage::url() const {
                      token_.empty() ? "" : "?token=" + token_);
 }
 
-void LivePage::show(PageImage image) {
+long LivePage::show(PageImage image) {
   const auto age = std::chrono::duration_cast<Time::duration>(std::chrono::duration<double>(image.age_s));
   images_.put({std::move(image), ++shown_, std::chrono::steady_clock::now() - age});
+  return shown_;
 }
 
 void LivePage::tell(const PageLoop& loop, const std::string& state) {
@@ -122,7 +123,10 @@ PageWishes LivePage::take_wishes() {
   if (is_recent(start_s_.exchange(never))) wishes.hold = false;
   if (hold_.exchange(false)) wishes.hold = true;  // of two between ticks, the one that holds
   wishes.stop = stop_;
-  if (const auto tip = tips_.take(); tip && is_recent(tip->asked_s)) wishes.tip_px = tip->at_px;
+  if (const auto wish = tips_.take()) {
+    wishes.tip = wish->tip;
+    wishes.tip->too_late = !is_recent(wish->asked_s);
+  }
   return wishes;
 }
 
@@ -189,18 +193,21 @@ HttpResponse LivePage::start(const HttpRequest& request) {
 
 HttpResponse LivePage::want_tip(const HttpRequest& request) {
   if (!config_.takes_tip_goals) return plain(403, "no goals of the tip are taken here");
-  const auto u_px = number_of(request, "u"), v_px = number_of(request, "v"), asked_s = time_of(request);
-  if (!u_px || !v_px || !asked_s)
-    return plain(400, "a goal of the tip needs its pixel and time: ?u=&v=&at= now_s of /state");
+  const auto u_px = number_of(request, "u"), v_px = number_of(request, "v"), asked_s = time_of(request),
+             image = number_of(request, "image");
+  if (!u_px || !v_px || !asked_s || !image)
+    return plain(400,
+                 "a goal needs its pixel, image and time: ?u=&v=&image= X-Number of /picture &at= now_s of /state");
   if (!is_recent(*asked_s)) return plain(409, "it came too late, the goal stays");
   {
     const std::lock_guard lock(mutex_);
     fetch();
     const cv::Mat& bgr = newest_.image.bgr;
+    if (!(*image >= 1 && *image <= static_cast<double>(newest_.number))) return plain(400, "there is no such image");
     if (!(*u_px >= -0.5 && *u_px <= bgr.cols - 0.5 && *v_px >= -0.5 && *v_px <= bgr.rows - 0.5))
       return plain(400, "it lies outside of the image");
   }
-  tips_.put({{*u_px, *v_px}, *asked_s});
+  tips_.put({{{*u_px, *v_px}, static_cast<long>(*image)}, *asked_s});
   return plain(202, "accepted");
 }
 

@@ -54,9 +54,15 @@ struct PageLoop {
 
 /// The commands of the page's users.
 struct PageWishes {
-  std::optional<bool> hold;               ///< true: hold; false: start; the last one
-  bool stop = false;                      ///< end the run
-  std::optional<Eigen::Vector2d> tip_px;  ///< where in the image the tip is wanted
+  /// Where in an image the tip is wanted.
+  struct Tip {
+    Eigen::Vector2d at_px;
+    long image = 0;         ///< its number by LivePage::show()
+    bool too_late = false;  ///< not taken within a second: void, its sender does not expect motion any more
+  };
+  std::optional<bool> hold;  ///< true: hold; false: start; the last one
+  bool stop = false;         ///< end the run
+  std::optional<Tip> tip;
 };
 
 /// The page for users without a screen on this computer. Its inputs never wait: it keeps the newest image only, and
@@ -71,15 +77,16 @@ class LivePage {
   std::string url() const;
 
   // By the loop's thread.
-  void show(PageImage image);
+  /// The image's number, from 1 on.
+  long show(PageImage image);
   /// `state`: the loop's, in words.
   void tell(const PageLoop& loop, const std::string& state);
   /// Nothing more comes: the page shows the last, without buttons.
   void end() { over_ = true; }
   /// Whether a browser has shown the page.
   bool was_watched() const { return watched_; }
-  /// The commands since the last call. A start and a goal of the tip that are not taken within a second are void: their
-  /// sender does not expect motion any more.
+  /// The commands since the last call. A start that is not taken within a second is void: its sender does not expect
+  /// motion any more.
   PageWishes take_wishes();
   /// Whether somebody pressed the page's run button throughout since the last call. A press that
   /// the network kept back for longer than HeldButton::max_age_s does not count.
@@ -133,7 +140,7 @@ class LivePage {
   std::atomic<bool> hold_ = false, stop_ = false, over_ = false, watched_ = false;
   std::atomic<double> start_s_ = never;  ///< when it was requested
   struct TipWish {
-    Eigen::Vector2d at_px;
+    PageWishes::Tip tip;
     double asked_s = never;
   };
   Mailbox<TipWish> tips_;

@@ -195,14 +195,14 @@ TEST(LivePage, StartsNothingLate) {
 TEST(LivePage, TakesAPixelForTheTipWhereItMay) {
   PageConfig config = config_of_test();
   const Rig rig = testing::small_test_rig();
-  const auto path = [](const std::string& u, const std::string& v, double ago_s = 0) {
-    return "/tip?u=" + u + "&v=" + v + "&" + start_path(ago_s).substr(std::string("/start?").size());
+  const auto path = [](const std::string& u, const std::string& v, double ago_s = 0, const std::string& image = "1") {
+    return "/tip?u=" + u + "&v=" + v + "&image=" + image + "&" + start_path(ago_s).substr(7);
   };
   {
     Served page(config);
     page.show(image_of(rig, 90));
     EXPECT_EQ(page.post(path("3", "4")), 403);
-    EXPECT_FALSE(page.take_wishes().tip_px);
+    EXPECT_FALSE(page.take_wishes().tip);
   }
   config.takes_tip_goals = true;
   Served page(config);
@@ -210,20 +210,22 @@ TEST(LivePage, TakesAPixelForTheTipWhereItMay) {
   page.show(image_of(rig, 90));
   EXPECT_EQ(page.post(path("3", "4")), 202);
   EXPECT_EQ(page.post(path("20.5", "10.25")), 202);
-  EXPECT_EQ(page.take_wishes().tip_px, Eigen::Vector2d(20.5, 10.25));
-  EXPECT_FALSE(page.take_wishes().tip_px) << "once";
+  const auto tip = page.take_wishes().tip;
+  EXPECT_TRUE(tip && tip->at_px == Eigen::Vector2d(20.5, 10.25) && tip->image == 1 && !tip->too_late);
+  EXPECT_FALSE(page.take_wishes().tip) << "once";
   EXPECT_EQ(page.post(path("3", "4", 1.1)), 409);
   const std::string beyond = std::to_string(rig.camera.width_px);
   for (const std::string& u : {std::string("-1"), beyond, std::string("nan"), std::string("")})
     EXPECT_EQ(page.post(path(u, "4")), 400) << u;
-  EXPECT_EQ(page.post("/tip?u=3&v=4"), 400);
+  EXPECT_EQ(page.post("/tip?u=3&v=4&image=1"), 400);
+  for (const char* image : {"", "0", "2", "nan"}) EXPECT_EQ(page.post(path("3", "4", 0, image)), 400) << image;
   EXPECT_EQ(
       http_status(http(page.port, "POST", path("3", "4"), "Origin: http://evil.example\r\nContent-Length: 0\r\n")),
       403);
-  EXPECT_FALSE(page.take_wishes().tip_px);
+  EXPECT_FALSE(page.take_wishes().tip);
   EXPECT_EQ(page.post(path("3", "4", 0.9)), 202);
   std::this_thread::sleep_for(std::chrono::milliseconds(200));
-  EXPECT_FALSE(page.take_wishes().tip_px) << "its sender does not expect it any more";
+  EXPECT_TRUE(page.take_wishes().tip.value().too_late) << "its sender does not expect it any more";
   PageLoop loop;
   loop.answer = "refused: tip_goal";
   page.tell(loop, "track");

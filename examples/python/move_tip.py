@@ -14,22 +14,22 @@ if len(sys.argv) < 3:
 page = sys.argv[1].rstrip("/")
 
 
-def now_and_answer():
+def state():
     with urllib.request.urlopen(f"{page}/state") as answer:
-        state = json.load(answer)
-    return state["now_s"], (state["loop"] or {}).get("answer")
+        return json.load(answer)
 
 
 for pixel in sys.argv[2:]:
     u, v = (float(number) for number in pixel.split(","))
-    now_s, before = now_and_answer()
-    goal = urllib.request.Request(f"{page}/tip?u={u}&v={v}&at={now_s}", method="POST", headers={"Origin": page})
+    now = state()
+    goal = urllib.request.Request(f"{page}/tip?u={u}&v={v}&image={now['images']}&at={now['now_s']}", method="POST",
+                                  headers={"Origin": page})
     try:
         urllib.request.urlopen(goal)
     except urllib.error.HTTPError as refusal:
         sys.exit(f"{pixel}: {refusal.read().decode().strip()}")
     end = time.monotonic() + 10
-    while (answer := now_and_answer()[1]) == before and time.monotonic() < end:
+    while (answer := state()["loop"]["answer"]) == now["loop"]["answer"] and time.monotonic() < end:
         time.sleep(0.1)
-    print(f"{pixel}: {answer if answer != before else 'no answer'}")
+    print(f"{pixel}: {answer if answer != now['loop']['answer'] else 'no answer'}")
     time.sleep(3)

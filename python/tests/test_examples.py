@@ -40,8 +40,25 @@ def test_the_tip_goes_to_pixels_of_the_page(tmp_path):
                               "--web", "0"], stdout=subprocess.PIPE, text=True)
     try:
         page = servo.stdout.readline().split()[1]
-        while json.load(urllib.request.urlopen(f"{page}state"))["images"] < 10:
+
+        def state():
+            return json.load(urllib.request.urlopen(f"{page}state"))
+
+        def goal_of_a_click(image):
+            before = state()
+            urllib.request.urlopen(urllib.request.Request(f"{page}tip?u=760&v=430&image={image}&at={before['now_s']}", method="POST",
+                                                          headers={"Origin": page[:-1]}))
+            while (answer := state()["loop"]["answer"]) == before["loop"]["answer"]:
+                time.sleep(0.1)
+            assert answer.startswith("a goal of the tip came"), answer
+            time.sleep(2)
+            return np.array([one["desired"] for one in state()["loop"]["features"][1:]])
+
+        while (state()["loop"] or {"time_s": 0})["time_s"] < 7:  # by then the paper's trajectory has changed the tip's depth
             time.sleep(0.1)
+        late = state()["images"]
+        first, of_early, again = (goal_of_a_click(image) for image in (late, 10, late))
+        assert np.abs(first - again).max() < 5 < 20 < np.abs(first - of_early).max(), (first, of_early, again)
         near, corner = run("move_tip.py", page, "760,430", "1,1").splitlines()
         assert near.startswith("760,430: a goal of the tip came"), near
         assert corner.startswith("1,1: refused: tip_goal: "), corner

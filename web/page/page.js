@@ -201,13 +201,13 @@ function choose(pixel, place) {
 at("picture").addEventListener("click", (event) => {
   if (!event.shiftKey || !last || !last.takes_tip_goals || at("buttons").hidden) return;
   const picture = at("picture"), x = event.offsetX / picture.clientWidth, y = event.offsetY / picture.clientHeight;
-  choose({ u: x * picture.naturalWidth - 0.5, v: y * picture.naturalHeight - 0.5 }, { left: `${100 * x}%`, top: `${100 * y}%` });
+  choose({ u: x * picture.naturalWidth - 0.5, v: y * picture.naturalHeight - 0.5, image: number }, { left: `${100 * x}%`, top: `${100 * y}%` });
 });
 at("move").addEventListener("click", () => {
-  const { u, v } = target;
+  const { u, v, image } = target;
   choose(null);
   answered = last.loop ? last.loop.answer : "";
-  command("tip", `tip?u=${u.toFixed(1)}&v=${v.toFixed(1)}&at=${serverNowS()}`);
+  command("tip", `tip?u=${u.toFixed(1)}&v=${v.toFixed(1)}&image=${image}&at=${serverNowS()}`);
 });
 at("cancel").addEventListener("click", () => choose(null));
 

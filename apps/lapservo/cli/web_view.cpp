@@ -52,8 +52,8 @@ WebView::WebView(const WebOptions& options, PageConfig config) {
   std::fflush(stdout);
 }
 
-void WebView::show(PageImage image) {
-  page_->show(std::move(image));
+long WebView::show(PageImage image) {
+  return page_->show(std::move(image));
 }
 
 void WebView::tell(const PageLoop& loop, const std::string& state) {
@@ -83,7 +83,9 @@ WebView::WebView(const WebOptions&, PageConfig) {
       "--web", "needs a page, which this build lacks: it was built without libmicrohttpd-dev and nlohmann-json3-dev");
 }
 
-void WebView::show(PageImage) {}
+long WebView::show(PageImage) {
+  return 0;
+}
 void WebView::tell(const PageLoop&, const std::string&) {}
 void WebView::end() {}
 bool WebView::was_watched() const {

@@ -30,7 +30,7 @@ class WebView {
   WebView(const WebOptions& options, internal::PageConfig config);
 
   // See internal::LivePage.
-  void show(internal::PageImage image);
+  long show(internal::PageImage image);
   void tell(const internal::PageLoop& loop, const std::string& state);
   void end();
   bool was_watched() const;

@@ -10,6 +10,8 @@ namespace lapservo::app {
 using namespace internal;
 namespace {
 
+constexpr std::size_t most_shown = 3600;  // a minute's images, in which a click may be confirmed
+
 PageConfig config_of(const ServoOptions& options, const Rig& rig, const std::string& title, bool may_start) {
   const Instrument& instrument = rig.instruments.front();
   PageConfig config;
@@ -49,9 +51,11 @@ void ServoPage::tell(const ControlTick& tick, double time_s, const std::string& 
   }
   if (tick.seen) {
     const Observation& seen = tick.seen->observations.front();
-    tip_depth_m_ = seen.tip ? std::optional(seen.tip->camera_from_tip.translation.z()) : std::nullopt;
-    first_from_camera_ = tick.seen->first_from_camera;
-    web_.show({tick.seen->image.bgr, rig_, tick.seen->observations, tick.input.time_s - tick.seen->image.time_s});
+    shown_.push_front({seen.tip ? std::optional(seen.tip->camera_from_tip.translation.z()) : std::nullopt,
+                       tick.seen->first_from_camera});
+    if (shown_.size() > most_shown) shown_.pop_back();
+    newest_ =
+        web_.show({tick.seen->image.bgr, rig_, tick.seen->observations, tick.input.time_s - tick.seen->image.time_s});
   }
   PageLoop loop = loop_of(tick, time_s);
   loop.can_start = can_start;
@@ -60,12 +64,17 @@ void ServoPage::tell(const ControlTick& tick, double time_s, const std::string& 
 }
 
 std::optional<TipGoal> ServoPage::tip_goal() {
-  const auto wanted_px = std::exchange(tip_px_, std::nullopt);
-  if (!wanted_px) return std::nullopt;
-  const auto ideal_px = rig_->camera.ideal_from_raw(*wanted_px);
+  const auto wanted = std::exchange(tip_, std::nullopt);
+  if (!wanted) return std::nullopt;
+  if (wanted->too_late)
+    throw InputError("tip_goal", "is dropped, as it took longer than a second to the loop: click again");
+  const auto age = static_cast<std::size_t>(newest_ - wanted->image);
+  if (age >= shown_.size()) throw InputError("tip_goal", "is dropped, as its image is too old: click again");
+  const auto& [depth_m, first_from_camera] = shown_[age];
+  const auto ideal_px = rig_->camera.ideal_from_raw(wanted->at_px);
   if (!ideal_px) throw InputError("tip_goal", "lies where the lens shows nothing");
-  if (!tip_depth_m_) throw InputError("tip_goal", "needs the tip's depth, and the image does not show the tip now");
-  return TipGoal{first_from_camera_ * Eigen::Vector3d(*tip_depth_m_ * rig_->camera.ray_from_ideal(*ideal_px))};
+  if (!depth_m) throw InputError("tip_goal", "needs the tip's depth, and that image does not show it");
+  return TipGoal{first_from_camera * Eigen::Vector3d(*depth_m * rig_->camera.ray_from_ideal(*ideal_px))};
 }
 
 void ServoPage::answer(double time_s, const std::string& words) {
@@ -74,7 +83,7 @@ void ServoPage::answer(double time_s, const std::string& words) {
 
 bool ServoPage::command(Supervisor& arm, double now_s) {
   const PageWishes wishes = web_.wishes();
-  if (wishes.tip_px) tip_px_ = wishes.tip_px;
+  if (wishes.tip) tip_ = wishes.tip;
   if (wishes.hold) *wishes.hold ? arm.stop(Commander::page) : arm.start(Commander::page, now_s);
   return wishes.stop;
 }

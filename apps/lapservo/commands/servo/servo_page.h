@@ -1,5 +1,6 @@
 #pragma once
 
+#include <deque>
 #include <memory>
 #include <string>
 
@@ -19,8 +20,8 @@ class ServoPage {
 
   /// `state`: in words.
   void tell(const ControlTick& tick, double time_s, const std::string& state, bool can_start);
-  /// Where the page wants the tip: at a pixel of the newest image, at the tip's present depth; in the frame of the
-  /// loop's goals. Throws InputError where the tip is not seen.
+  /// Where the page wants the tip: at a pixel of an image, at the depth that the tip has there; in the frame of the
+  /// loop's goals. Throws InputError where that image does not show the tip, and for a goal that is dropped.
   std::optional<TipGoal> tip_goal();
   /// The answer to goals, in words.
   void answer(double time_s, const std::string& words);
@@ -33,9 +34,14 @@ class ServoPage {
   WebView web_;
   std::shared_ptr<const Rig> rig_;  ///< with the camera_from_rcm that the loop goes by
   int registration_ = 0;
-  std::optional<Eigen::Vector2d> tip_px_;  ///< where it is wanted
-  std::optional<double> tip_depth_m_;      ///< in the newest image
-  Rigid3 first_from_camera_;               ///< of that image
+  /// The tip in an image.
+  struct ShownTip {
+    std::optional<double> depth_m;
+    Rigid3 first_from_camera;
+  };
+  long newest_ = 0;                               ///< number of the newest image
+  std::deque<ShownTip> shown_;                    ///< the newest first
+  std::optional<internal::PageWishes::Tip> tip_;  ///< as it is wanted
   std::string answer_;
 };
 
