@@ -120,8 +120,8 @@ class DynamicLoop {
     // r counts from where the rig has the RCM.
     image.features[1] += (seen.ends_px.head<2>() - rcm_image_px(rig, std::nullopt).value()).norm() - seen.features[1];
     for (int i = 0; i < 4; ++i) image.ends_px[i] = seen.ends_px[i] + 0.15 * random.normal();
-    const auto noise = [&](double sigma) {
-      return sigma * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
+    const auto noise = [&](double rms) {
+      return rms * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
     };
     image.camera_from_marker = Rigid3{rotation_by(noise(0.5e-3)) * camera_from_marker.rotation,
                                       camera_from_marker.translation + noise(0.02e-3)};
