@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <cstddef>
 
 #include <Eigen/Geometry>
 #include <fmt/format.h>
@@ -13,7 +14,7 @@ namespace lapservo {
 namespace {
 
 using Covariance = TipInMarker::Covariance;
-using Motion = Eigen::Matrix<double, 6, 1>;
+using internal::TipSlopes;
 
 Rigid3 turned_about_z(double angle_rad, const Eigen::Vector3d& translation) {
   return {Eigen::Quaterniond(Eigen::AngleAxisd(angle_rad, Eigen::Vector3d::UnitZ())), translation};
@@ -25,34 +26,31 @@ Rigid3 previous_from_joint(const WristJoint& joint, double reading_rad) {
   return link * turned_about_z(joint.theta_rad + reading_rad + joint.offset_rad, {0, 0, joint.d_m});
 }
 
-// How a point moves with a rotation about a frame's z, and the rotation itself.
-Motion turn_about_z_of(const Rigid3& frame, const Eigen::Vector3d& point) {
-  const Eigen::Vector3d axis = frame.rotation * Eigen::Vector3d::UnitZ();
-  Motion motion;
-  motion << axis.cross(point - frame.translation), axis;
-  return motion;
+using Frames = std::array<Rigid3, 1 + Tool::max_wrist_joints>;
+
+// The base and each joint turn a point about the z of their frames.
+TipSlopes slopes_of(const Frames& frames, std::size_t joints, const Eigen::Vector3d& point) {
+  TipSlopes slopes = TipSlopes::Zero();
+  slopes.topLeftCorner<3, 3>().setIdentity();
+  for (std::size_t i = 0; i <= joints; ++i) {
+    const Eigen::Vector3d axis = frames[i].rotation * Eigen::Vector3d::UnitZ();
+    slopes.col(static_cast<Eigen::Index>(3 + i)) << axis.cross(point - frames[i].translation), axis;
+  }
+  return slopes;
 }
 
-Covariance readings_covariance(const Tool& tool, std::span<const Motion> by_joint) {
+Covariance readings_covariance(const Tool& tool, const TipSlopes& slopes) {
   const std::size_t count = tool.wrist.size();
+  const auto by_joint = [&](std::size_t i) -> Eigen::Matrix<double, 6, 1> {
+    return tool.wrist[i].sigma_reading_rad * slopes.col(static_cast<Eigen::Index>(4 + i));
+  };
   Covariance covariance = Covariance::Zero();
-  for (std::size_t i = 0; i < count; ++i) {
-    Motion motion = tool.wrist[i].sigma_reading_rad * by_joint[i];
-    if (tool.snake_like && 2 * i + 1 < count)
-      motion += tool.wrist[count - 1 - i].sigma_reading_rad * by_joint[count - 1 - i];
-    if (!tool.snake_like || 2 * i < count) covariance += motion * motion.transpose();
+  for (std::size_t i = 0; i < count && (!tool.snake_like || 2 * i < count); ++i) {
+    Eigen::Matrix<double, 6, 1> motion = by_joint(i);
+    if (tool.snake_like && 2 * i + 1 < count) motion += by_joint(count - 1 - i);
+    covariance += motion * motion.transpose();
   }
   return covariance;
-}
-
-Covariance place_covariance(const Tool::PlaceCovariance& place, const Motion& by_azimuth,
-                            std::span<const Motion> by_joint) {
-  Eigen::Matrix<double, 6, 4 + Tool::max_wrist_joints> slopes;
-  slopes.setZero();
-  slopes.topLeftCorner<3, 3>().setIdentity();
-  slopes.col(3) = by_azimuth;
-  for (std::size_t i = 0; i < by_joint.size(); ++i) slopes.col(static_cast<Eigen::Index>(4 + i)) = by_joint[i];
-  return slopes * place * slopes.transpose();
 }
 
 }  // namespace
@@ -73,31 +71,30 @@ void internal::expect_wrist(const Tool& tool, std::span<const double> wrist_rad)
       throw InputError("tool", tool.wrist[i].name, fmt::format("{}", wrist_rad[i]), "a finite angle in radians");
 }
 
-std::array<Rigid3, 1 + Tool::max_wrist_joints> internal::joints_in_marker(const Tool& tool,
-                                                                          std::span<const double> wrist_rad) {
+Frames internal::joints_in_marker(const Tool& tool, std::span<const double> wrist_rad) {
   if (!tool.place) throw InputError("tool", "place", "missing", "where the tool sits behind the marker");
   if (tool.wrist.size() > Tool::max_wrist_joints)
     throw InputError("tool", "wrist", fmt::format("{} joints", tool.wrist.size()),
                      fmt::format("at most {}", Tool::max_wrist_joints));
   expect_wrist(tool, wrist_rad);
-  std::array<Rigid3, 1 + Tool::max_wrist_joints> frames{
-      turned_about_z(tool.place->azimuth_rad, tool.place->base_in_marker_m)};
+  Frames frames{turned_about_z(tool.place->azimuth_rad, tool.place->base_in_marker_m)};
   for (std::size_t i = 0; i < wrist_rad.size(); ++i)
     frames[i + 1] = frames[i] * previous_from_joint(tool.wrist[i], wrist_rad[i]);
   return frames;
 }
 
+TipSlopes internal::tip_slopes(const Tool& tool, std::span<const double> wrist_rad) {
+  const auto frames = joints_in_marker(tool, wrist_rad);
+  return slopes_of(frames, wrist_rad.size(), frames[wrist_rad.size()] * tool.last_from_tip.translation);
+}
+
 TipInMarker tip_in_marker(const Tool& tool, std::span<const double> wrist_rad) {
   const auto frames = internal::joints_in_marker(tool, wrist_rad);
-  const std::size_t count = wrist_rad.size();
-  TipInMarker tip{frames[count] * tool.last_from_tip};
+  TipInMarker tip{frames[wrist_rad.size()] * tool.last_from_tip};
   tip.marker_from_tip.rotation.normalize();
-  const Eigen::Vector3d& point = tip.marker_from_tip.translation;
-  std::array<Motion, Tool::max_wrist_joints> by_joint;
-  for (std::size_t i = 0; i < count; ++i) by_joint[i] = turn_about_z_of(frames[i + 1], point);
-  const std::span<const Motion> motions(by_joint.data(), count);
-  tip.of_place = place_covariance(tool.place->covariance, turn_about_z_of(frames[0], point), motions);
-  tip.of_readings = readings_covariance(tool, motions);
+  const TipSlopes slopes = slopes_of(frames, wrist_rad.size(), tip.marker_from_tip.translation);
+  tip.of_place = slopes * tool.place->covariance * slopes.transpose();
+  tip.of_readings = readings_covariance(tool, slopes);
   tip.covariance_m2 = (tip.of_place + tip.of_readings).topLeftCorner<3, 3>();
   return tip;
 }

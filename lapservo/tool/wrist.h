@@ -20,4 +20,9 @@ void expect_wrist(const Tool& tool, std::span<const double> wrist_rad);
 /// as tip_in_marker does.
 std::array<Rigid3, 1 + Tool::max_wrist_joints> joints_in_marker(const Tool& tool, std::span<const double> wrist_rad);
 
+/// How the tip moves (position [m], rotation vector [rad], marker's axes) with each number of a place's covariance, in
+/// their order; 0 for joints that the wrist lacks. Throws as tip_in_marker does.
+using TipSlopes = Eigen::Matrix<double, 6, ToolPlace::Covariance::RowsAtCompileTime>;
+TipSlopes tip_slopes(const Tool& tool, std::span<const double> wrist_rad);
+
 }  // namespace lapservo::internal

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "lapservo/tool/wrist.h"
+
 namespace lapservo::internal {
 namespace {
 
@@ -20,27 +22,6 @@ Tool::Place place_before(const Tool& tool) {
   return place;
 }
 
-Eigen::Vector3d tip_m(const Tool& tool, const std::vector<double>& wrist_rad) {
-  return tip_in_marker(tool, wrist_rad).marker_from_tip.translation;
-}
-
-using Slopes = Eigen::Matrix<double, 3, 1 + Tool::max_wrist_joints>;
-
-// Slopes of the tip by azimuth and offsets.
-Slopes slopes_of_tip(const Tool& tool, const std::vector<double>& wrist_rad) {
-  constexpr double step_rad = 1e-6;
-  Slopes slopes = Slopes::Zero();
-  for (std::size_t i = 0; i <= tool.wrist.size(); ++i) {
-    const auto moved = [&](double by_rad) {
-      Tool other = tool;
-      (i == 0 ? other.place->azimuth_rad : other.wrist[i - 1].offset_rad) += by_rad;
-      return tip_m(other, wrist_rad);
-    };
-    slopes.col(static_cast<Eigen::Index>(i)) = (moved(step_rad) - moved(-step_rad)) / (2 * step_rad);
-  }
-  return slopes;
-}
-
 }  // namespace
 
 Tool placed_by_tip(Tool tool, const std::vector<double>& wrist_rad, const Eigen::Vector3d& tip_in_marker_m,
@@ -48,8 +29,8 @@ Tool placed_by_tip(Tool tool, const std::vector<double>& wrist_rad, const Eigen:
   Tool::Place place = place_before(tool);
   place.base_in_marker_m.setZero();
   tool.place = place;
-  place.base_in_marker_m = tip_in_marker_m - tip_m(tool, wrist_rad);
-  const Slopes slopes = slopes_of_tip(tool, wrist_rad);
+  place.base_in_marker_m = tip_in_marker_m - tip_in_marker(tool, wrist_rad).marker_from_tip.translation;
+  const auto slopes = tip_slopes(tool, wrist_rad).topRightCorner<3, 5>().eval();
   const Eigen::Matrix<double, 5, 5> rest = place.covariance.bottomRightCorner<5, 5>();
   place.covariance.topLeftCorner<3, 3>() = covariance_m2 + slopes * rest * slopes.transpose();
   place.covariance.topRightCorner<3, 5>() = -slopes * rest;
