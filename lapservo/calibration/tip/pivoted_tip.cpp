@@ -89,7 +89,7 @@ std::vector<TipFault> possible_faults(const std::vector<TimedPose>& poses) {
 }  // namespace
 
 TipCalibration pivoted_tip(const Tool& tool, const std::vector<double>& wrist_rad,
-                           const std::vector<TimedPose>& all_poses, const AtIteration& at_iteration) {
+                           const std::vector<TimedPose>& all_poses) {
   TipCalibration result;
   const std::vector<TimedPose> poses = some_of(all_poses, enough_poses);
   if (poses.size() < least_poses) {
@@ -104,8 +104,7 @@ TipCalibration pivoted_tip(const Tool& tool, const std::vector<double>& wrist_ra
     for (const TimedPose& pose : poses) sightings.push_back({pose, wrist_rad});
     result = fit_tip(tool, sightings,
                      {possible_faults(poses), 0, usual_unmodelled_sigmas, poses_per_second(poses),
-                      "is it in its dimple all the time, is the wrist held straight, does anything else move", to_do},
-                     at_iteration);
+                      "is it in its dimple all the time, is the wrist held straight, does anything else move", to_do});
   }
   return result;
 }

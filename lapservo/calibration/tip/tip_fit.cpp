@@ -177,14 +177,13 @@ double left_by(const FrameFit& fit) {
 
 // From all sides, where the azimuth is open. The way's faults are held, unless they are fitted, too.
 std::optional<ModelFit> best_fit(const Tool& tool, const std::vector<TipSighting>& sightings, const TipWay& way,
-                                 bool with_faults, const AtIteration& at_iteration) {
+                                 bool with_faults) {
   const int starts = is_bent_differently(sightings) ? 8 : 1;
   std::optional<ModelFit> best;
   for (int k = 0; k < starts; ++k) {
     TipModel model(tool, sightings, way, two_pi * k / starts);
-    auto fit =
-        fit_frames([&](const Eigen::VectorXd& x) { return model.residuals(x); }, model.unknowns(), way.alike_sightings,
-                   at_iteration, with_faults ? 0 : static_cast<std::size_t>(model.faults().size));
+    auto fit = fit_frames([&](const Eigen::VectorXd& x) { return model.residuals(x); }, model.unknowns(),
+                          way.alike_sightings, {}, with_faults ? 0 : static_cast<std::size_t>(model.faults().size));
     if (fit && (!best || left_by(*fit) < left_by(best->fit))) best.emplace(ModelFit{std::move(model), std::move(*fit)});
   }
   return best;
@@ -197,13 +196,13 @@ struct Explanation {
 
 // The fault that leaves least of a misfit.
 Explanation explaining_fault(const Tool& tool, const std::vector<TipSighting>& sightings, const TipWay& way,
-                             const FrameFit& without, const AtIteration& at_iteration) {
+                             const FrameFit& without) {
   constexpr double least_gain = 0.9;
   Explanation best{least_gain * left_by(without)};
   for (const TipFault& fault : way.faults) {
     TipWay with = way;
     with.faults = {fault};
-    const auto fitted = best_fit(tool, sightings, with, true, at_iteration);
+    const auto fitted = best_fit(tool, sightings, with, true);
     if (!fitted || left_by(fitted->fit) > best.left) continue;
     const double size_m = fitted->model.faults().of(fitted->fit.x).norm();
     best = {left_by(fitted->fit), size_m, fmt::format("{} by {:.2g} mm: {}", fault.what, 1e3 * size_m, fault.remedy)};
@@ -234,10 +233,9 @@ std::string refusal_of(const TipCalibration& result, const TipWay& way, double f
 
 }  // namespace
 
-TipCalibration fit_tip(const Tool& tool, const std::vector<TipSighting>& sightings, const TipWay& way,
-                       const AtIteration& at_iteration) {
+TipCalibration fit_tip(const Tool& tool, const std::vector<TipSighting>& sightings, const TipWay& way) {
   TipCalibration result;
-  const auto best = best_fit(tool, sightings, way, false, at_iteration);
+  const auto best = best_fit(tool, sightings, way, false);
   if (!best) return result.refusal = "the tip is left open: " + way.to_do, result;
   const auto& [model, fit] = *best;
   const double unmodelled = way.unmodelled_sigmas * way.unmodelled_sigmas;
@@ -252,8 +250,7 @@ TipCalibration fit_tip(const Tool& tool, const std::vector<TipSighting>& sightin
         std::max(result.sigma_m, std::sqrt(eigenvalues_of_symmetric(tip.of_place.topLeftCorner<3, 3>())[2]));
   }
   Explanation fault{0};
-  if (!fit.departures.seen.empty() || is_misfit(result))
-    fault = explaining_fault(tool, sightings, way, fit, at_iteration);
+  if (!fit.departures.seen.empty() || is_misfit(result)) fault = explaining_fault(tool, sightings, way, fit);
   if (fault.size_m > least_fault_m) result.fault = fault.text;
   result.refusal = refusal_of(result, way, fault.size_m);
   return result;

@@ -6,7 +6,6 @@
 
 #include <Eigen/Core>
 
-#include "lapservo/calibration/fit/at_iteration.h"
 #include "lapservo/calibration/registration/timed_pose.h"
 #include "lapservo/tool/tool.h"
 
@@ -49,7 +48,6 @@ struct TipCalibration {
 /// The place of a tool whose tip was at points (Ceres, Cauchy loss). Half of a pose's error is common to all. A wrist
 /// that is bent differently in the sightings shows its azimuth and its joints' offsets, which the tool's own sigmas
 /// bound. Refused where the tip is left open, or misses its points by more than a tip may be off.
-TipCalibration fit_tip(const Tool& tool, const std::vector<TipSighting>& sightings, const TipWay& way,
-                       const AtIteration& at_iteration = {});
+TipCalibration fit_tip(const Tool& tool, const std::vector<TipSighting>& sightings, const TipWay& way);
 
 }  // namespace lapservo::internal

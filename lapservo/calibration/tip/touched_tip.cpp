@@ -27,7 +27,7 @@ std::vector<TipFault> possible_faults(const std::vector<TipSighting>& touches) {
 }  // namespace
 
 TipCalibration touched_tip(const Tool& tool, const std::vector<TipSighting>& touches,
-                           const std::vector<std::string>& names, const AtIteration& at_iteration) {
+                           const std::vector<std::string>& names) {
   constexpr double outlying = 8, least_outlying_m = 0.5e-3;
   TipCalibration result;
   if (touches.size() < least_touches)
@@ -36,8 +36,7 @@ TipCalibration touched_tip(const Tool& tool, const std::vector<TipSighting>& tou
   result = fit_tip(tool, touches,
                    {possible_faults(touches), touch_sigma_m, 1, 1,
                     "is the wrist loose (hold it with its motors on), are the corners the ones that are named",
-                    "touch more corners, the shaft tilted and rolled differently"},
-                   at_iteration);
+                    "touch more corners, the shaft tilted and rolled differently"});
   if (result.misses_m.empty()) return result;
   const auto worst = std::max_element(result.misses_m.begin(), result.misses_m.end());
   const double usual_m = median(std::vector<double>(result.misses_m));
