@@ -183,19 +183,14 @@ Trajectory TipGoals::features_of(const Trajectory& goal) {
             if (!wanted) return last_ = goal.at(time_s);
             if (const auto now = desired(goal, time_s)) {
               last_ = *now;
-              if (wanted->roll_rad || wanted->camera_from_tip) keep_psi(configuration(*wanted)->psi_rad);
+              if (wanted->roll_rad || wanted->camera_from_tip)  // a free roll after it stays there
+                psi_rad_ = configuration(*wanted)->psi_rad, psi_by_ = PsiBy::goal;
             } else {
               last_.rate.setZero(), last_.acceleration.setZero();
             }
             return last_;
           },
           goal.tip};
-}
-
-// A free roll after one that was given stays there.
-void TipGoals::keep_psi(double psi_rad) {
-  psi_rad_ = psi_rad;
-  psi_by_ = PsiBy::goal;
 }
 
 }  // namespace lapservo::internal

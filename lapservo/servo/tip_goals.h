@@ -53,7 +53,6 @@ class TipGoals {
   std::optional<DesiredFeatures> desired(const Trajectory& goal, double time_s) const;
   std::optional<Rigid3> marker_from_tip(double ahead_s) const;
   void follow_wrist(const std::vector<double>& now_rad, double time_s);
-  void keep_psi(double psi_rad);
 
   Rig rig_;
   Scales scales_;
