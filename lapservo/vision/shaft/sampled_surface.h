@@ -59,7 +59,7 @@ class LineInImage {
 struct SampledSurface {
   static constexpr std::size_t samples_along = 128;
   static constexpr int line_count = 13;
-  /// Of the visible half angle: beyond, bands are too foreshortened and dark.
+  /// Fraction of the visible half angle that the lines cover: beyond, bands are too foreshortened and dark.
   static constexpr double reach = 0.74;
   struct Line {
     double azimuth_rad;
@@ -69,10 +69,10 @@ struct SampledSurface {
   /// From `beyond_m` before the marker's proximal end to as far behind its distal one.
   SampledSurface(const Scene& scene, const ShaftPose& pose, const CylinderView& view, double beyond_m);
 
-  /// Of a sample, from the proximal end; and samples, with a fraction, before a place.
+  /// The distance of a sample from the proximal end, and how many samples, with a fraction, lie before a distance.
   double along_m(std::size_t sample) const { return first_m + (static_cast<double>(sample) + 0.5) * step_m; }
   double samples_before(double along_m) const { return (along_m - first_m) / step_m; }
-  /// Of the nearest sample.
+  /// The class of the nearest sample.
   std::uint8_t class_at(const Line& line, double along_m) const {
     return line.classes[static_cast<std::size_t>(std::clamp(samples_before(along_m), 0.0, samples_along - 1.0))];
   }
