@@ -632,10 +632,12 @@ TEST_P(FirstWireLoop, ThePageNamesWhereTheTipGoes) {
   rig_.instruments[0].tool.emplace().place.emplace().base_in_marker_m = {0, 0, 0.045};
   testing::write_file(folder_ / "rig.yaml", rig_yaml(rig_));
   const auto click = [](int port, double u_px, double v_px) {
-    return posted(port, fmt::format("/tip?u={}&v={}&{}", u_px, v_px, testing::start_path().substr(7)));
+    const std::string state = testing::http(port, "GET", "/state");
+    const int image = std::stoi(state.substr(state.find(R"("images":)") + 9));
+    return posted(port, fmt::format("/tip?u={}&v={}&image={}&{}", u_px, v_px, image, testing::start_path().substr(7)));
   };
   begin("--web 0");
-  int port = page_port();
+  const int port = page_port();
   ASSERT_TRUE(moves(500));
   EXPECT_EQ(click(port, 1, 1), 202);
   expect_soon_said("refused: tip_goal: can't be followed at 0.00 s: ");
@@ -646,15 +648,14 @@ TEST_P(FirstWireLoop, ThePageNamesWhereTheTipGoes) {
   sleep(4);
   end();
   spy_->expect_no_jump();
-  const auto q = spy_->heard().back().q;
-  const Rigid3 camera_from_marker = lapservo::camera_from_marker(
-      rig_.instruments[0].marker, *rig_.instruments[0].camera_from_rcm, JointVector::from_vector(q));
+  const Rigid3 camera_from_marker =
+      lapservo::camera_from_marker(rig_.instruments[0].marker, *rig_.instruments[0].camera_from_rcm,
+                                   JointVector::from_vector(spy_->heard().back().q));
   const Eigen::Vector2d tip_px = rig_.camera.ideal_from_point(camera_from_marker * Eigen::Vector3d(0, 0, 0.045));
   EXPECT_LT((tip_px - Eigen::Vector2d(420, 240)).norm(), 40) << "by joints that are off by degrees";
   begin("--web 0 --control topics");
-  port = page_port();
   ASSERT_TRUE(moves(100));
-  EXPECT_EQ(click(port, 420, 240), 403);
+  EXPECT_EQ(click(page_port(), 420, 240), 403);
   end();
 }
 

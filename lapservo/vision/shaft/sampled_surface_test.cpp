@@ -19,10 +19,7 @@ TEST(LineInImage, ShowsNoPointThatTheLensFoldsIntoTheImage) {
   const auto shows = [&](const Eigen::Vector3d& point, bool on_shaft) {
     return LineInImage<1>(scene, point, Eigen::Vector3d::Zero()).pixel(0, on_shaft) != nullptr;
   };
-  for (const bool on_shaft : {false, true}) {
-    EXPECT_TRUE(shows(ahead, on_shaft));
-    EXPECT_FALSE(shows(aside, on_shaft));
-  }
+  for (const bool on_shaft : {false, true}) EXPECT_TRUE(shows(ahead, on_shaft) && !shows(aside, on_shaft));
 }
 
 }  // namespace
