@@ -44,7 +44,7 @@ std::vector<Observation> with_q(std::vector<Observation> seen, const Instrument&
     if (one.rcm || !one.marker) continue;
     const Rigid3 unrolled_from_marker = camera_from_marker(instrument.marker, Rigid3(), 0).inverse();
     const ShaftPose pose{one.marker->camera_from_marker * unrolled_from_marker, 0};
-    one.rcm.emplace().q = configuration_of(pose, *instrument.camera_from_rcm).value();
+    one.rcm = Observation::Rcm{configuration_of(pose, *instrument.camera_from_rcm).value()};
     one.rcm->covariance = Eigen::Matrix4d::Identity() * std::pow(one.marker->sigma_roll_rad, 2);
   }
   return seen;
