@@ -33,10 +33,10 @@ bool agrees_well(const FineFit& fit) {
 }
 
 // The print's fault, not the scene's: a boundary is not where it should be on lines on which nothing hides it.
-bool misses_a_boundary(const ColourAgreement& agreement, const FineFit& fit) {
+bool misses_a_boundary(const Scene& scene, const FineFit& fit) {
   for (std::size_t k = 0; k < 4; ++k) {
     if (fit.used[k] >= limits.missed_fraction * fit.in_image[k]) continue;
-    const double clear = agreement.clear[k] * fit.lines;
+    const int clear = lines_in_clear_view(scene, fit.unknowns.pose(), k, fit.lines);
     if (clear >= limits.min_lines && fit.used[k] < limits.missed_fraction * clear) return true;
   }
   return false;
@@ -48,9 +48,9 @@ bool has_right_psi(const Scene& scene, const FineFit& fit) {
 }
 
 // Sigma of psi, and the print.
-Status validate_psi(const Scene& scene, const ColourAgreement& agreement, const FineFit& fit) {
+Status validate_psi(const Scene& scene, const FineFit& fit) {
   const double limit = squared(limits.max_sigma_psi_rad), by_tolerance = fit.psi_variance_by_tolerance;
-  if (fit.off_probability > limits.certainly_off || (by_tolerance < limit && misses_a_boundary(agreement, fit)))
+  if (fit.off_probability > limits.certainly_off || (by_tolerance < limit && misses_a_boundary(scene, fit)))
     return fit.is_well_seen() ? Status::marker_mismatch : Status::uncertain;
   const bool is_sure = fit.psi_variance_rad2() < limit + limits.tolerance_slack * by_tolerance;
   return is_sure && has_right_psi(scene, fit) ? Status::ok : Status::uncertain;
@@ -58,8 +58,29 @@ Status validate_psi(const Scene& scene, const ColourAgreement& agreement, const 
 
 }  // namespace
 
+int lines_in_clear_view(const Scene& scene, const ShaftPose& pose, std::size_t boundary, int lines) {
+  constexpr double reach = 0.9, beside_px = 4;
+  const auto view = view_cylinder(pose.camera_from_unrolled, scene.marker.radius_m());
+  if (!view) return 0;
+  const Eigen::Vector3d axis = pose.camera_from_unrolled.rotation * Eigen::Vector3d::UnitZ();
+  int count = 0;
+  for (int i = 0; i < lines; ++i) {
+    const double azimuth_rad = visible_azimuth_rad(*view, reach, i, lines);
+    const double tau_rad = marker_azimuth_rad(scene.marker, azimuth_rad, pose.psi_rad);
+    const double along_m = boundaries_m(scene.marker, tau_rad)[boundary];
+    const Eigen::Vector3d point =
+        pose.camera_from_unrolled * surface_point(scene.marker.radius_m(), azimuth_rad, along_m);
+    const double px_per_m = (scene.camera.raw_with_jacobian(point).d_px_d_point * axis).norm();
+    const Eigen::Vector3d apart = 2 * beside_px / px_per_m * axis;
+    const LineInImage<2> sides(scene, point - apart, apart);
+    const auto is_ours = [&](std::size_t side) { return scene.is_ours(sides.class_on_shaft(side)); };
+    count += (boundary == 0 || is_ours(0)) && (boundary == 3 || is_ours(1));
+  }
+  return count;
+}
+
 ColourAgreement colour_agreement(const Scene& scene, const ShaftPose& pose, const EdgeBlur& blur) {
-  constexpr double length_beyond = 0.04, blurs_beyond = 2, clear_px = 4;
+  constexpr double length_beyond = 0.04, blurs_beyond = 2;
   // About boundaries and the seam colours mix: so far, and at least this fraction of the length.
   constexpr double blurred_px = 1.5, min_guard = 0.02;
   const auto view = view_cylinder(pose.camera_from_unrolled, scene.marker.radius_m());
@@ -69,21 +90,16 @@ ColourAgreement colour_agreement(const Scene& scene, const ShaftPose& pose, cons
   const Eigen::Vector3d middle =
       pose.camera_from_unrolled * surface_point(radius_m, view->facing_azimuth_rad, length_m / 2);
   const double px_per_m = (scene.camera.raw_with_jacobian(middle).d_px_d_point * axis).norm();
-  const double guard_m = std::max(min_guard * length_m, blurred_px / px_per_m), clear_m = clear_px / px_per_m;
+  const double guard_m = std::max(min_guard * length_m, blurred_px / px_per_m);
   const std::array blurred_m{std::max(guard_m, blurs_beyond * blur.along_px[0] / px_per_m),
                              std::max(guard_m, blurs_beyond * blur.along_px[3] / px_per_m)};
-  const SampledSurface surface(scene, pose, *view,
-                               std::max({blurred_m[0], blurred_m[1], clear_m}) + length_beyond * length_m);
+  const SampledSurface<48> surface(scene, pose, *view, std::max(blurred_m[0], blurred_m[1]) + length_beyond * length_m);
   ColourAgreement agreement;
   double total = 0, inside = 0;
   std::array<double, 2> beyond{}, going_on{};  // of both ends
-  for (const SampledSurface::Line& line : surface.lines) {
+  for (const auto& line : surface.lines) {
     const double tau_rad = marker_azimuth_rad(scene.marker, line.azimuth_rad, pose.psi_rad);
     const auto ends_m = boundaries_m(scene.marker, tau_rad);
-    const auto is_ours = [&](double along_m) { return scene.is_ours(surface.class_at(line, along_m)); };
-    for (std::size_t k = 0; k < 4; ++k)
-      if ((k == 0 || is_ours(ends_m[k] - clear_m)) && (k == 3 || is_ours(ends_m[k] + clear_m)))
-        agreement.clear[k] += 1.0 / SampledSurface::line_count;
     if (distance_to_seam_rad(scene.marker, tau_rad) * radius_m < guard_m) continue;
     for (std::size_t sample = 0; sample < line.classes.size(); ++sample) {
       const double along_m = surface.along_m(sample);
@@ -116,7 +132,7 @@ Status validate(const Scene& scene, const FineFit& fit) {
   if (agreement.wrong > limits.max_wrong || agreement.beyond > limits.max_beyond || !agrees_well(fit))
     return Status::poor_fit;
   if (scene.registration && !fit.unknowns.through_rcm() && !fit.is_well_seen()) return Status::uncertain;
-  return validate_psi(scene, agreement, fit);
+  return validate_psi(scene, fit);
 }
 
 }  // namespace lapservo::internal

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <array>
+#include <cstddef>
 
 #include "lapservo/vision/model/fine_fit.h"
 #include "lapservo/vision/shaft/scene.h"
@@ -34,11 +34,12 @@ struct ColourAgreement {
   double wrong = 0;     ///< fraction that has another of the marker's colours
   double beyond = 0;    ///< of the samples just beyond an end, the fraction on which its band goes on; of the worse end
   double in_image = 0;  ///< fraction of the visible surface that lies inside the image
-  /// By boundary, the fraction of lines along the marker on which nothing hides it: colours of the marker, whichever,
-  /// show on both sides, of an end inside.
-  std::array<double, 4> clear{};
 };
 ColourAgreement colour_agreement(const Scene& scene, const ShaftPose& pose, const EdgeBlur& blur = {});
+
+/// On how many of so many lines along the marker nothing hides a boundary: colours of the marker, whichever, show on
+/// both sides, of an end inside.
+int lines_in_clear_view(const Scene& scene, const ShaftPose& pose, std::size_t boundary, int lines);
 
 /// Whether a fit is good enough to move a robot by: Status::ok, or why not.
 Status validate(const Scene& scene, const FineFit& fit);

@@ -21,8 +21,9 @@
 namespace lapservo::internal {
 namespace {
 
-constexpr int line_count = SampledSurface::line_count, station_count = 15;
-constexpr std::size_t samples_along = SampledSurface::samples_along;
+constexpr std::size_t samples_along = 128;
+using Surface = SampledSurface<samples_along>;
+constexpr int line_count = Surface::line_count, station_count = 15;
 constexpr int max_reach = 200;      // samples on each side of a section's middle
 constexpr double max_hidden = 0.8;  // of a section of the shaft: what the image's border leaves must have a side
 
@@ -94,9 +95,9 @@ SidePoints measure_sides(const Scene& scene, const ShaftPose& pose, const Cylind
   return points;
 }
 
-BoundaryPoints measure_boundaries(const Scene& scene, const ShaftPose& pose, const SampledSurface& surface) {
+BoundaryPoints measure_boundaries(const Scene& scene, const ShaftPose& pose, const Surface& surface) {
   BoundaryPoints points;
-  for (const SampledSurface::Line& line : surface.lines) {
+  for (const Surface::Line& line : surface.lines) {
     const LineSegmentation split = segment_line(line.classes, scene.bands);
     for (std::size_t k = 0; k < 4; ++k) {
       if (!split.seen[k]) continue;
@@ -172,7 +173,7 @@ std::optional<PoseUnknowns> stepped(const Scene& scene, const PoseUnknowns& unkn
 // Agreement of the sampled colours with the marker's at a rotation: matches minus wrong colours, over all colours seen.
 class RotationScore {
  public:
-  RotationScore(const Scene& scene, const SampledSurface& surface) : scene_(scene), surface_(surface) {
+  RotationScore(const Scene& scene, const Surface& surface) : scene_(scene), surface_(surface) {
     const auto upper_m = boundaries_m(scene.marker, 0), slopes_m = boundary_slopes_m(scene.marker);
     for (std::size_t k = 0; k < 4; ++k) {
       upper_[k] = surface.samples_before(upper_m[k]) + 0.5;
@@ -209,7 +210,7 @@ class RotationScore {
   }
 
   const Scene& scene_;
-  const SampledSurface& surface_;
+  const Surface& surface_;
   std::array<double, 4> upper_, slope_;  // of the boundaries, in steps of the surface: at the seam and per radian
   std::array<std::array<std::array<int, 3>, samples_along + 1>, line_count> sums_;  // over samples before, per band
   int seen_ = 0;
@@ -218,7 +219,7 @@ class RotationScore {
 struct RotationSearch {
   double psi_rad, score, rival_score;
 };
-RotationSearch search_rotation(const Scene& scene, const SampledSurface& surface) {
+RotationSearch search_rotation(const Scene& scene, const Surface& surface) {
   constexpr int steps = 90, rival_gap = 10;  // 0.7 rad
   const RotationScore score(scene, surface);
   std::array<double, steps> scores{};
@@ -244,8 +245,8 @@ CoarseFit fit_coarsely(const Scene& scene, PoseUnknowns start, Rotation rotation
     if (!view) return fit;
     const double narrowing = round == 0 ? 1 : 0.5;
     const auto sides = measure_sides(scene, fit.unknowns.pose(), *view, narrowing * coarse_fit_limits.lateral_reach_px);
-    const SampledSurface surface(scene, fit.unknowns.pose(), *view,
-                                 narrowing * coarse_fit_limits.along_reach * scene.marker.length_m());
+    const Surface surface(scene, fit.unknowns.pose(), *view,
+                          narrowing * coarse_fit_limits.along_reach * scene.marker.length_m());
     const auto boundaries = measure_boundaries(scene, fit.unknowns.pose(), surface);
     if (boundaries.size() < coarse_fit_limits.min_boundaries || sides.size() < coarse_fit_limits.min_sides) return fit;
     if (round == 1) {

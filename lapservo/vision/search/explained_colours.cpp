@@ -82,9 +82,9 @@ double explained_area_px2(const Scene& scene, const ShaftPose& pose, bool turned
   if (!view) return no_area_px2;
   const double radius_m = scene.marker.radius_m(), whole_px2 = area_px2(scene, pose);
   const double least_gain = above_px2 * (lines * places_along) / whole_px2 - rounding;
-  const Eigen::Vector3d axis = pose.camera_from_unrolled.rotation * Eigen::Vector3d::UnitZ();
+  const Eigen::Vector3d step =
+      pose.camera_from_unrolled.rotation * Eigen::Vector3d(0, 0, scene.marker.length_m() / places_along);
   const auto band_of = bands_of_class(scene);
-  const double step_m = scene.marker.length_m() / places_along;
   BandsAlong bands{};
   if (!turned) bands = bands_of_whole_turn(scene.marker);
   double gained = 0;
@@ -93,8 +93,8 @@ double explained_area_px2(const Scene& scene, const ShaftPose& pose, bool turned
     const double azimuth_rad = visible_azimuth_rad(*view, line_reach, i, lines);
     if (turned) bands = bands_at(scene.marker, marker_azimuth_rad(scene.marker, azimuth_rad, pose.psi_rad));
     const Eigen::Vector3d base = pose.camera_from_unrolled * surface_point(radius_m, azimuth_rad, 0);
-    const LineInImage<places_along + 2 * beyond> line(scene, base - beyond * step_m * axis, step_m * axis);
-    for (std::size_t k = 0; k < line.count; ++k) {
+    const LineInImage<places_along + 2 * beyond> line(scene, base - beyond * step, step);
+    for (std::size_t k = 0; k < places_along + 2 * beyond; ++k) {
       const std::uint8_t here = k >= beyond && k < beyond + places_along ? bands[k - beyond] : 0;
       if (const std::uint8_t* bgr = line.pixel(k, here != 0)) gained += gain(bgr, band_of[scene.classes(bgr)], here);
     }
@@ -104,8 +104,8 @@ double explained_area_px2(const Scene& scene, const ShaftPose& pose, bool turned
     for (const double radii : beside_radii) {
       const Eigen::Vector3d base =
           pose.camera_from_unrolled * surface_point(radii * radius_m, view->facing_azimuth_rad + side * pi / 2, 0);
-      const LineInImage<places_along> line(scene, base, step_m * axis);
-      for (std::size_t k = 0; k < line.count; ++k)
+      const LineInImage<places_along> line(scene, base, step);
+      for (std::size_t k = 0; k < places_along; ++k)
         if (const std::uint8_t* bgr = line.pixel(k, false))
           gained +=
               colour_evidence.of(Place::beside, band_of[scene.classes(bgr)] ? Shows::another_band : grey_or_other(bgr));

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -18,18 +17,16 @@ namespace lapservo::internal {
 template <std::size_t Count>
 class LineInImage {
  public:
-  static constexpr std::size_t count = Count;
-
   LineInImage(const Scene& scene, const Eigen::Vector3d& base, const Eigen::Vector3d& step) : scene_(scene) {
     const Camera& camera = scene.camera;
-    for (std::size_t k = 0; k < count; ++k) {
+    for (std::size_t k = 0; k < Count; ++k) {
       const double steps = static_cast<double>(k) + 0.5;
       const double inverse_z = 1 / (depth_m_[k] = base.z() + steps * step.z());
       u_px_[k] = camera.cx_px + camera.fx_px * (base.x() + steps * step.x()) * inverse_z;
       v_px_[k] = camera.cy_px + camera.fy_px * (base.y() + steps * step.y()) * inverse_z;
     }
     if (!camera.distorted()) return;
-    for (std::size_t k = 0; k < count; ++k) {
+    for (std::size_t k = 0; k < Count; ++k) {
       if (!scene.field.contains(base + (static_cast<double>(k) + 0.5) * step)) depth_m_[k] = 0;
       const Eigen::Vector2d raw_px = camera.raw_from_ideal({u_px_[k], v_px_[k]});
       u_px_[k] = raw_px.x(), v_px_[k] = raw_px.y();
@@ -49,6 +46,11 @@ class LineInImage {
     }
     return scene_.image.pixel(static_cast<int>(u), static_cast<int>(v));
   }
+  /// Colour class of the shaft there, Scene::outside where the image says nothing of it.
+  std::uint8_t class_on_shaft(std::size_t k) const {
+    const std::uint8_t* const bgr = pixel(k, true);
+    return bgr ? scene_.classes(bgr) : Scene::outside;
+  }
 
  private:
   const Scene& scene_;
@@ -56,26 +58,32 @@ class LineInImage {
 };
 
 /// Colour classes along lines of a shaft's visible surface.
+template <std::size_t Samples>
 struct SampledSurface {
-  static constexpr std::size_t samples_along = 128;
   static constexpr int line_count = 13;
   /// Fraction of the visible half angle that the lines cover: beyond, bands are too foreshortened and dark.
   static constexpr double reach = 0.74;
   struct Line {
     double azimuth_rad;
-    std::array<std::uint8_t, samples_along> classes;  ///< Scene::outside where the image says nothing of the shaft
+    std::array<std::uint8_t, Samples> classes;  ///< Scene::outside where the image says nothing of the shaft
   };
 
   /// From `beyond_m` before the marker's proximal end to as far behind its distal one.
-  SampledSurface(const Scene& scene, const ShaftPose& pose, const CylinderView& view, double beyond_m);
+  SampledSurface(const Scene& scene, const ShaftPose& pose, const CylinderView& view, double beyond_m)
+      : first_m(-beyond_m), step_m((scene.marker.length_m() + 2 * beyond_m) / Samples) {
+    const Eigen::Vector3d step = pose.camera_from_unrolled.rotation * Eigen::Vector3d(0, 0, step_m);
+    for (int i = 0; i < line_count; ++i) {
+      Line& line = lines[static_cast<std::size_t>(i)];
+      line.azimuth_rad = visible_azimuth_rad(view, reach, i, line_count);
+      const LineInImage<Samples> places(
+          scene, pose.camera_from_unrolled * surface_point(scene.marker.radius_m(), line.azimuth_rad, first_m), step);
+      for (std::size_t k = 0; k < Samples; ++k) line.classes[k] = places.class_on_shaft(k);
+    }
+  }
 
   /// The distance of a sample from the proximal end, and how many samples, with a fraction, lie before a distance.
   double along_m(std::size_t sample) const { return first_m + (static_cast<double>(sample) + 0.5) * step_m; }
   double samples_before(double along_m) const { return (along_m - first_m) / step_m; }
-  /// The class of the nearest sample.
-  std::uint8_t class_at(const Line& line, double along_m) const {
-    return line.classes[static_cast<std::size_t>(std::clamp(samples_before(along_m), 0.0, samples_along - 1.0))];
-  }
 
   double first_m, step_m;
   std::array<Line, line_count> lines;
