@@ -35,12 +35,18 @@ std::optional<JointVector> configuration_through(const Rigid3& camera_from_rcm,
   return JointVector{std::atan2(arm.y(), arm.x()), std::acos(std::clamp(arm.z() / rho_m, -1.0, 1.0)), rho_m, 0};
 }
 
+std::optional<JointVector> configuration_through(const Rigid3& camera_from_rcm, const Rigid3& camera_from_shaft) {
+  auto q = configuration_through(camera_from_rcm, camera_from_shaft.translation);
+  if (!q) return std::nullopt;
+  const Rigid3 unrolled = camera_from_rcm * rcm_from_unrolled(*q);
+  q->psi_rad = internal::roll_between_rad(unrolled.rotation, camera_from_shaft.rotation);
+  return q;
+}
+
 std::optional<JointVector> configuration_of_marker(const Marker& marker, const Rigid3& camera_from_rcm,
                                                    const Rigid3& seen_camera_from_marker) {
-  auto q = configuration_through(camera_from_rcm, seen_camera_from_marker.translation);
-  if (!q) return std::nullopt;
-  const Rigid3 unturned = camera_from_marker(marker, camera_from_rcm, *q);
-  q->psi_rad = internal::roll_between_rad(unturned.rotation, seen_camera_from_marker.rotation);
+  auto q = configuration_through(camera_from_rcm, seen_camera_from_marker);
+  if (q) q->psi_rad -= marker.seam_rad;
   return q;
 }
 

@@ -27,7 +27,10 @@ Rigid3 camera_from_marker(const Marker& marker, const Rigid3& camera_from_rcm, c
 std::optional<JointVector> configuration_through(const Rigid3& camera_from_rcm,
                                                  const Eigen::Vector3d& proximal_end_in_camera);
 
-/// The same with the marker's rotation.
+/// The same of a frame there whose z is along the shaft. psi: by how much it is turned against the unrolled frame.
+std::optional<JointVector> configuration_through(const Rigid3& camera_from_rcm, const Rigid3& camera_from_shaft);
+
+/// The same of a marker's frame.
 std::optional<JointVector> configuration_of_marker(const Marker& marker, const Rigid3& camera_from_rcm,
                                                    const Rigid3& seen_camera_from_marker);
 

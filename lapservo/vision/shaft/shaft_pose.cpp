@@ -27,10 +27,8 @@ ShaftPose pose_through_rcm(const Rigid3& camera_from_rcm, const JointVector& q) 
 }
 
 std::optional<JointVector> configuration_of(const ShaftPose& pose, const Rigid3& camera_from_rcm) {
-  auto q = configuration_through(camera_from_rcm, pose.camera_from_unrolled.translation);
-  if (!q) return std::nullopt;
-  const Rigid3 through_rcm = camera_from_rcm * rcm_from_unrolled(*q);
-  q->psi_rad = pose.psi_rad + roll_between_rad(through_rcm.rotation, pose.camera_from_unrolled.rotation);
+  auto q = configuration_through(camera_from_rcm, pose.camera_from_unrolled);
+  if (q) q->psi_rad += pose.psi_rad;
   return q;
 }
 
