@@ -166,10 +166,8 @@ int steer_arm(const ServoOptions& options) {
   if (options.enable_motion) require_joint_limits("--enable-motion", options.joint_limits);
   RunConfig config = run_config_of(options);
   const Rig rig = config.rig;
-  joints_of(options, rig);  // throws where the rig has none
-  const InterlockConfig interlock =
-      interlock_of(rig.instruments.front(), config.controller.limits, options.enable_motion,
-                   static_cast<std::size_t>(options.setpoint_readers));
+  const InterlockConfig interlock = interlock_of(arm_of(options, rig), config.controller.limits, options.enable_motion,
+                                                 static_cast<std::size_t>(options.setpoint_readers));
   if (!options.endoscope.empty() &&
       (config.controller.mode != ControlMode::fused || !rig.instruments.front().camera_from_rcm))
     throw InputError("--endoscope", "needs camera_from_rcm in the rig and --method default");

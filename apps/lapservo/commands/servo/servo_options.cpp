@@ -28,7 +28,7 @@ constexpr double window_margin_px = 20, via_dwell_s = 1;
 const Eigen::Vector4d via_rate(0.05, 60, 40, 40);  // s_rad, r, l, d px a second
 
 JointLimits limits_of(const ServoOptions& options, const Rig& rig) {
-  return limits_of_q(joints_of(options, rig), load_arm_limits(options.joint_limits));
+  return limits_of_q(*arm_of(options, rig).joints, load_arm_limits(options.joint_limits));
 }
 
 ControllerConfig controller_of(const ServoOptions& options, const Rig& rig) {
@@ -130,11 +130,11 @@ Eigen::Vector4d four(const std::vector<double>& values) {
   return Eigen::Vector4d(values.data());
 }
 
-const Joints& joints_of(const ServoOptions& options, const Rig& rig) {
-  const auto& joints = rig.instruments.front().joints;
-  if (!joints)
+const Instrument& arm_of(const ServoOptions& options, const Rig& rig) {
+  const Instrument& instrument = rig.instruments.front();
+  if (!instrument.joints)
     throw InputError(options.rig, "instruments[0].joints is missing, expected the arm's joints: names, sign, offset");
-  return *joints;
+  return instrument;
 }
 
 Trajectory trajectory_of(const ServoOptions& options) {

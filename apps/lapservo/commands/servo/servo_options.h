@@ -42,8 +42,8 @@ Eigen::Vector4d four(const std::vector<double>& values);
 RunConfig run_config_of(const ServoOptions& options);
 /// The uncalibrated mode gets to know no more of the RCM than its image.
 void forget_registration(RunConfig& run, const ServoOptions& options);
-/// The rig's `joints` entry. Throws InputError when there is none.
-const Joints& joints_of(const ServoOptions& options, const Rig& rig);
+/// The rig's first instrument. Throws InputError when it has no `joints`.
+const Instrument& arm_of(const ServoOptions& options, const Rig& rig);
 
 /// Whether "page" or "topics" may say stop and start, and set goals.
 bool may_command(const ServoOptions& options, std::string_view who);

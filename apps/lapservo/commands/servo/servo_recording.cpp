@@ -60,8 +60,7 @@ int decide_on_recording(const ServoOptions& options) {
   } else {
     say_remark(path, bag->remark());
   }
-  const Instrument& instrument = rig.instruments.front();
-  joints_of(options, rig);  // throws where the rig has none
+  const Instrument& instrument = arm_of(options, rig);
   auto frames = open_frames(options.replay, options.recorded, &rig.camera);
   auto wrist = find_wrist_input(options.replay, "", options.joint_topic, instrument, frames.get());
   if (const std::string why = no_tip_text(instrument, wrist.has_value()); !why.empty())
