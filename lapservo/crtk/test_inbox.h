@@ -38,10 +38,9 @@ class TestInbox {
   }
   /// The first message. Says it again until it arrives: discovery takes its time.
   Message get(const std::function<void()>& say) {
-    const bool came = testing::wait_for([&] { return !empty() || (say(), !empty()); }, std::chrono::milliseconds(20));
-    EXPECT_TRUE(came);
+    EXPECT_TRUE(testing::wait_for([&] { return !empty() || (say(), !empty()); }, std::chrono::milliseconds(20)));
     const std::lock_guard lock(mutex_);
-    return came ? messages_.front() : Message{};
+    return messages_.empty() ? Message{} : messages_.front();
   }
 
  private:

@@ -65,12 +65,10 @@ void expect_order(Delivery offered, auto subscribe, Message (*numbered)(int)) {
   std::this_thread::sleep_for(std::chrono::milliseconds(50));
   heard.clear();
   int said = 0;
-  std::size_t count = 0;
   for (int burst = 0; burst < bursts; ++burst) {
-    const int size = 2 + burst % 4;
-    for (int k = 0; k < size; ++k) Wire<Message>::write(writer, numbered(++said));
-    count += static_cast<std::size_t>(size);
-    if (!testing::wait_for([&] { return heard.count() >= count; }, std::chrono::microseconds(50))) break;
+    for (int k = 0; k < 2 + burst % 4; ++k) Wire<Message>::write(writer, numbered(++said));
+    const auto complete = [&] { return heard.count() >= static_cast<std::size_t>(said); };
+    if (!testing::wait_for(complete, std::chrono::microseconds(50))) break;
   }
   std::this_thread::sleep_for(std::chrono::milliseconds(20));
   EXPECT_EQ(numbers_of(heard), range(1, bursts * 7 / 2)) << static_cast<int>(offered);
