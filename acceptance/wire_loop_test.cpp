@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <chrono>
 #include <cmath>
 #include <csignal>
 #include <cstdio>
@@ -26,6 +25,7 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/control/paper_trajectory.h"
+#include "lapservo/core/wall_clock.h"
 #include "lapservo/crtk/dvrk_frames.h"
 #include "lapservo/crtk/joint_map.h"
 #include "lapservo/kinematics/centre_line.h"
@@ -45,32 +45,13 @@
 
 namespace lapservo::internal {
 namespace {
+using testing::sleep;
 using testing::wait_for;
 
 constexpr double allowed_s = 0.1;  // from a fault to the last setpoint
 constexpr double tick_s = 1.0 / 500;
 const JointLimits limits;  // those of the file, but for rounded positions
 const double rest_s = (limits.rate.cwiseQuotient(limits.acceleration)).maxCoeff();
-
-// Those that this build has.
-std::vector<std::string> transports() {
-  return {
-#ifdef LAPSERVO_ROS2
-      "ros2",
-#endif
-#ifdef LAPSERVO_ROS1
-      "ros1",
-#endif
-  };
-}
-
-double now_s() {
-  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
-}
-
-void sleep(double duration_s) {
-  std::this_thread::sleep_for(std::chrono::duration<double>(duration_s));
-}
 
 // The tool with the arguments of a line, its output in a file; killed with the object.
 struct Process : testing::Process {
@@ -144,14 +125,14 @@ class Arm {
         simulator_(rig, simulated(), {0.05, 1.57, 0.064, 1.2}),
         robot_(*transport_, rig, simulator_, config()) {
     thread_ = std::thread([this] {
-      const double begin_s = now_s();
+      const double begin_s = since_1970_s();
       double paused_s = 0;
       while (!ended_) {
         sleep(0.001);
         if (silent) {
-          paused_s = now_s() - begin_s - simulator_.now_s();
+          paused_s = since_1970_s() - begin_s - simulator_.now_s();
         } else {
-          robot_.advance(now_s() - begin_s - paused_s);
+          robot_.advance(since_1970_s() - begin_s - paused_s);
         }
       }
     });
@@ -286,13 +267,13 @@ class WireLoop : public ::testing::TestWithParam<std::string> {
   // At most every two seconds: a start that is repeated does not count.
   void start() {
     constexpr double between_s = 2;
-    if (now_s() - started_s_ < between_s) return;
-    started_s_ = now_s();
+    if (since_1970_s() - started_s_ < between_s) return;
+    started_s_ = since_1970_s();
     command_({started_s_, "start"});
   }
   void expect_to_rest_until(const std::function<void()>& start) {
     sleep(rest_s + 0.2);
-    const double rested_s = now_s();
+    const double rested_s = since_1970_s();
     sleep(0.5);
     EXPECT_LE(spy_->last_s(), rested_s);
     start();
@@ -305,7 +286,7 @@ class WireLoop : public ::testing::TestWithParam<std::string> {
   // Held as soon as nobody presses any more, and when it is pressed again.
   void expect_to_move_only_while_pressed(const std::function<void()>& press, const std::function<void()>& release) {
     ASSERT_TRUE(moves(300, press));
-    const double released_s = now_s();
+    const double released_s = since_1970_s();
     release();
     expect_soon_said("hold: operator_absent", said().rfind("track"));
     sleep(1);
@@ -351,9 +332,9 @@ class WireLoop : public ::testing::TestWithParam<std::string> {
 };
 // Code that all wires share is tested on the first one only: it is in real time.
 class FirstWireLoop : public WireLoop {};
-INSTANTIATE_TEST_SUITE_P(Over, WireLoop, ::testing::ValuesIn(transports()),
+INSTANTIATE_TEST_SUITE_P(Over, WireLoop, ::testing::ValuesIn(named_transports()),
                          [](const auto& wire) { return wire.param; });
-INSTANTIATE_TEST_SUITE_P(Over, FirstWireLoop, ::testing::Values(transports().front()),
+INSTANTIATE_TEST_SUITE_P(Over, FirstWireLoop, ::testing::Values(named_transports().front()),
                          [](const auto& wire) { return wire.param; });
 
 TEST_P(WireLoop, ASimulatedArmHasANameOfItsOwnAndRefusesOneThatIsTaken) {
@@ -421,7 +402,7 @@ TEST_P(WireLoop, GoesOnBesideAnArmThatHoldsTheEndoscope) {
   const auto ecm = ears_->place_publisher("/ECM/local/measured_cp");
   std::thread arm([&] {
     for (; !ended; sleep(0.01))
-      if (tells) ecm({now_s(), "ECM_base", {Eigen::Quaterniond(0.6, 0, 0.8, 0), {0.1, 0, 0.2}}});
+      if (tells) ecm({since_1970_s(), "ECM_base", {Eigen::Quaterniond(0.6, 0, 0.8, 0), {0.1, 0, 0.2}}});
   });
   begin("--endoscope " + GetParam() + ":ECM");
   EXPECT_TRUE(moves());
@@ -467,7 +448,7 @@ TEST_P(FirstWireLoop, HoldsAtAFaultWithin100MillisecondsAndGoesOnAfterAStartWith
     SCOPED_TRACE(fault.name);
     ASSERT_TRUE(moves(500));
     const std::size_t said_before = said().size();
-    const double fault_s = now_s();
+    const double fault_s = since_1970_s();
     fault.set(*room_, true);
     expect_soon_said(fault.said, said_before);
     sleep(1);
@@ -549,13 +530,15 @@ TEST_P(FirstWireLoop, RecordsAnArmThatItMovesAndCalibratesFromIt) {
   EXPECT_NE(said("base.json").find("\"base_frame\""), std::string::npos) << said("base.json");
   const auto ecm = ears_->place_publisher("/ECM/local/measured_cp");
   Process held(calibrate + "--endoscope " + GetParam() + ":ECM", file("held.txt"));
-  wait_for([&] { return ecm({now_s(), "ECM_base", {}}), said("base.json").find("\"name\"") != std::string::npos; });
+  wait_for([&] {
+    return ecm({since_1970_s(), "ECM_base", {}}), said("base.json").find("\"name\"") != std::string::npos;
+  });
   EXPECT_EQ(held.wait(), 0) << said("held.txt");
   EXPECT_NE(said("base.json").find("\"name\": \"PSM1\""), std::string::npos) << said("base.json");
 
   // Interrupted on its way it brakes, and keeps what it has.
   Process interrupted(moving("part"), file("interrupted.txt"));
-  const double begun_s = now_s();
+  const double begun_s = since_1970_s();
   ASSERT_TRUE(wait_for([&] { return spy_->moves_after(begun_s); })) << said("interrupted.txt");
   sleep(3);
   interrupted.signal(SIGINT);
@@ -570,11 +553,11 @@ TEST_P(WireLoop, ASecondPublisherIsNoticedWithin100MillisecondsAndHoldsUntilASta
   const auto say = foreign->joint_publisher("/PSM1/servo_jp");
   begin();
   ASSERT_TRUE(moves());
-  const double first_s = now_s();
+  const double first_s = since_1970_s();
   const Eigen::Vector4d elsewhere(0.02, 0, 0.08, 1);
   const Eigen::Vector4d theirs = q_from_joints(default_joints(), elsewhere);
   EXPECT_TRUE(wait_for([&] {
-    say({now_s(), {}, {elsewhere[0], elsewhere[1], elsewhere[2], elsewhere[3], 0.1, -0.2}});
+    say({since_1970_s(), {}, {elsewhere[0], elsewhere[1], elsewhere[2], elsewhere[3], 0.1, -0.2}});
     return said().find("foreign_command") != std::string::npos;
   }));
   sleep(1.5);
@@ -594,7 +577,7 @@ TEST_P(WireLoop, MovesOnlyWhileTheOperatorPressesAPedalOfEitherType) {
   for (const bool is_joy : {true, false}) {
     const std::string topic = is_joy ? "/footpedals/coag" : "/operator_present";
     SCOPED_TRACE(topic);
-    const auto set = [&](bool pressed) { is_joy ? joy({now_s(), {pressed}}) : button({pressed}); };
+    const auto set = [&](bool pressed) { is_joy ? joy({since_1970_s(), {pressed}}) : button({pressed}); };
     const auto press = [&] { set(true); };
     begin("--operator-present " + topic);
     expect_soon_said("hold: operator_absent");
@@ -663,10 +646,10 @@ TEST_P(FirstWireLoop, ThePageEndsTheWaitForAnArm) {
   const auto loop = servo(600, "--web 0");
   const int port = page_port();
   sleep(0.5);
-  const double asked_s = now_s();
+  const double asked_s = since_1970_s();
   EXPECT_EQ(posted(port, "/stop"), 202);
   EXPECT_EQ(loop->wait(), 1);
-  EXPECT_LT(now_s(), asked_s + 10);
+  EXPECT_LT(since_1970_s(), asked_s + 10);
   expect_said("end: requested on the page");
 }
 
@@ -694,21 +677,21 @@ TEST_P(FirstWireLoop, StopsAndStartsAndTakesSetPointsAndTrajectoriesByTopic) {
   const auto wish = ears_->joint_publisher("/lapservo/PSM1/set_point");
   const auto plan = ears_->trajectory_publisher("/lapservo/PSM1/trajectory");
   ASSERT_TRUE(moves());
-  command_({now_s(), "stop"});
+  command_({since_1970_s(), "stop"});
   expect_soon_said("hold: held");
   expect_to_rest_until([&] { start(); });
   const std::vector<std::string> names{"s_rad", "r_px", "l_px", "d_px"};
   const Eigen::Vector4d there = paper_sinusoids().offset;
-  wish({now_s(), names, {there[0], 1e6, 200, 100}});
+  wish({since_1970_s(), names, {there[0], 1e6, 200, 100}});
   expect_soon_said("refused: set_point");
   const Eigen::Vector4d here = {there[0], there[1] / 2, there[2] / 2, there[3] / 2};
   const std::vector<double> begin(here.data(), here.data() + 4), end_there{here[0], here[1] + 10, here[2], here[3]};
-  wish({now_s(), names, begin});
+  wish({since_1970_s(), names, begin});
   expect_soon_said("a setpoint came");
   sleep(2);
-  plan({now_s(), names, {{0, begin}, {0.1, {here[0], 1e6, here[2], here[3]}}}});
+  plan({since_1970_s(), names, {{0, begin}, {0.1, {here[0], 1e6, here[2], here[3]}}}});
   expect_soon_said("refused: trajectory");
-  const double planned_s = now_s();
+  const double planned_s = since_1970_s();
   plan({planned_s, names, {{0, begin}, {0.5, begin}, {1.5, end_there}}});
   expect_soon_said("a trajectory came");
   sleep(4);
@@ -740,13 +723,13 @@ TEST_P(WireLoop, SurvivesWhenEitherSideIsKilledOrStopped) {
   auto room = arm();
   loop_ = servo(600);
   ASSERT_TRUE(moves());
-  double fault_s = now_s();
+  double fault_s = since_1970_s();
   room->signal(SIGSTOP);  // as a network that pauses
   sleep(1);
   EXPECT_LE(spy_->last_s(), fault_s + allowed_s + rest_s);
   room->signal(SIGCONT);
   ASSERT_TRUE(moves(300, [&] { start(); }));
-  fault_s = now_s();
+  fault_s = since_1970_s();
   room->signal(SIGKILL);
   room->wait();
   sleep(0.5);

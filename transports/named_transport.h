@@ -3,6 +3,7 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "lapservo/crtk/transport.h"
 #ifdef LAPSERVO_ROS1
@@ -13,6 +14,18 @@
 #endif
 
 namespace lapservo::internal {
+
+/// The transports of this build, for tests and benchmarks.
+inline std::vector<std::string> named_transports() {
+  return {
+#ifdef LAPSERVO_ROS2
+      "ros2",
+#endif
+#ifdef LAPSERVO_ROS1
+      "ros1",
+#endif
+  };
+}
 
 /// For tests and benchmarks: "ros1" or "ros2", where they are built with it (LAPSERVO_ROS1, LAPSERVO_ROS2). Throws
 /// std::invalid_argument for others.

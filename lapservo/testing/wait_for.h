@@ -13,4 +13,8 @@ bool wait_for(const Condition& condition, std::chrono::microseconds interval = s
   return condition();
 }
 
+inline void sleep(double duration_s) {
+  std::this_thread::sleep_for(std::chrono::duration<double>(duration_s));
+}
+
 }  // namespace lapservo::testing

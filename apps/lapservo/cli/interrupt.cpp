@@ -1,6 +1,8 @@
 #include "apps/lapservo/cli/interrupt.h"
 
+#include <chrono>
 #include <csignal>
+#include <thread>
 
 namespace lapservo::app {
 namespace {
@@ -21,6 +23,15 @@ void watch_for_interrupts() {
 
 bool interrupted() {
   return asked_to_stop != 0;
+}
+
+bool wait_until(const std::function<bool()>& holds, double at_most_s) {
+  const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(at_most_s);
+  while (!holds()) {
+    if (interrupted() || std::chrono::steady_clock::now() > end) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  return true;
 }
 
 }  // namespace lapservo::app

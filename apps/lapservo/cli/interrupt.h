@@ -1,9 +1,14 @@
 #pragma once
 
+#include <functional>
+
 namespace lapservo::app {
 
 /// From now on Ctrl-C (and SIGTERM) lets the running job end well; a second one ends it at once.
 void watch_for_interrupts();
 bool interrupted();
+
+/// Whether `holds` comes true before Ctrl-C and within this time. Asked a hundred times a second.
+bool wait_until(const std::function<bool()>& holds, double at_most_s);
 
 }  // namespace lapservo::app

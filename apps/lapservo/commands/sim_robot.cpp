@@ -52,10 +52,8 @@ void refuse_taken_name(Transport& transport, const SimRobotConfig& config, const
       transport.subscribe_joints(topic_of(config.arm, "measured_js"), [&](JointMessage&&) { heard = true; });
   const auto states = transport.subscribe_operating_state(topic_of(config.arm, "operating_state"),
                                                           [&](OperatingStateMessage&&) { heard = true; });
-  SteadyClock clock;
-  for (const double end_s = clock.now_s() + listen_s; !heard && !interrupted() && clock.now_s() < end_s;)
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  if (heard) throw InputError("--arm", "is " + arm + ", where an arm is already, expected a name of its own");
+  if (wait_until([&] { return heard.load(); }, listen_s))
+    throw InputError("--arm", "is " + arm + ", where an arm is already, expected a name of its own");
 }
 
 // Those that come with the rigs of configs/, wherever these are.

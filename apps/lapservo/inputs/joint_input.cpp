@@ -114,21 +114,11 @@ void add_joint_topic_option(Command command, std::string& joint_topic) {
                      "or the only measured_js");
 }
 
-JointInput read_joint_input(const CalibrateOptions& options, const Instrument& instrument, const FrameSource* frames) {
-  const std::string path = bag_of(options.joints);
-  if (path.empty()) return read_table(options, instrument);
-  const auto bag = open_bag(path);
-  if (path != options.input) say_remark(path, bag->remark());
-  const BagTopic* topic = joint_topic_of(*bag, options.joint_topic, instrument.name);
-  if (!topic)
-    throw InputError(options.joints, std::string("has no messages of ") + joint_type + ", expected the joints'");
-  return read_topic(options, instrument, frames, *bag, *topic);
-}
-
 std::optional<JointInput> find_joint_input(const CalibrateOptions& options, const Instrument& instrument,
                                            const FrameSource* frames) {
-  if (!options.joints.empty()) return read_joint_input(options, instrument, frames);
-  const std::string path = bag_of(options.input);
+  const bool are_named = !options.joints.empty();
+  const std::string path = bag_of(are_named ? options.joints : options.input);
+  if (path.empty() && are_named) return read_table(options, instrument);
   if (path.empty()) {
     refuse_topic_outside_bags("--joint-topic", options.joint_topic, options.input);
     return std::nullopt;
@@ -136,6 +126,8 @@ std::optional<JointInput> find_joint_input(const CalibrateOptions& options, cons
   const auto bag = open_bag(path);
   if (path != options.input) say_remark(path, bag->remark());
   const BagTopic* topic = joint_topic_of(*bag, options.joint_topic, instrument.name);
+  if (!topic && are_named)
+    throw InputError(options.joints, std::string("has no messages of ") + joint_type + ", expected the joints'");
   if (!topic) return std::nullopt;
   return read_topic(options, instrument, frames, *bag, *topic);
 }

@@ -19,12 +19,10 @@ struct JointInput {
 void add_joint_options(Command command, CalibrateOptions& options, const std::string& help);
 void add_joint_topic_option(Command command, std::string& joint_topic);
 
-/// Joints of --joints, a CSV or a bag. Reads the instrument's joints; where it has none, the recording's own four in
-/// the order theta, phi, rho, psi. A bag's stamps go with those of `frames`; where these have none, or there is
-/// nullptr, its times begin with its joints. Throws InputError for other files.
-JointInput read_joint_input(const CalibrateOptions& options, const Instrument& instrument, const FrameSource* frames);
-
-/// The same, and without --joints of the input itself where it is a bag; nullopt without any.
+/// Joints of --joints, a CSV or a bag; without --joints of the input itself where it is a bag that has them, else
+/// nullopt. Reads the instrument's joints; where it has none, the recording's own four in the order theta, phi, rho,
+/// psi. A bag's stamps go with those of `frames`; where these have none, or there is nullptr, its times begin with its
+/// joints. Throws InputError for other files.
 std::optional<JointInput> find_joint_input(const CalibrateOptions& options, const Instrument& instrument,
                                            const FrameSource* frames);
 

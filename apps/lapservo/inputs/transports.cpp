@@ -73,7 +73,7 @@ FrameNames frame_names_of(const std::string& frames) {
   std::istringstream text(frames + ",");
   std::vector<std::string> names;
   for (std::string name; std::getline(text, name, ',');) names.push_back(name);
-  if (names.size() == 4) names.push_back(FrameNames().tip);  // as before tools had frames
+  if (names.size() == 4) names.push_back(FrameNames().tip);  // the tip is usually left out
   const std::set<std::string> distinct(names.begin(), names.end());
   if (names.size() != 5 || distinct.size() != 5 || distinct.contains("") ||
       frames.find_first_of(" /\t\n") != std::string::npos)

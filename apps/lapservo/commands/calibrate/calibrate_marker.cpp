@@ -27,7 +27,7 @@ std::optional<JointsOfTurn> joints_of_turn(const CalibrateOptions& options, cons
                                            const FrameSource& frames) {
   if (options.joints.empty()) return std::nullopt;
   expect_registration(instrument, options.rig, "--joints");
-  return JointsOfTurn{read_joint_input(options, instrument, &frames).recording, options.joints};
+  return JointsOfTurn{find_joint_input(options, instrument, &frames).value().recording, options.joints};
 }
 
 void print_table(const std::vector<CalibratedNumber>& numbers) {

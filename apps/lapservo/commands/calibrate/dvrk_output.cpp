@@ -2,7 +2,6 @@
 
 #include <chrono>
 #include <cstdio>
-#include <functional>
 #include <thread>
 
 #include <fmt/format.h>
@@ -20,16 +19,6 @@ using namespace internal;
 namespace {
 
 constexpr double wait_s = 15;
-
-bool wait_until(const std::function<bool()>& holds) {
-  const SteadyClock clock;
-  const double end_s = clock.now_s() + wait_s;
-  while (!holds()) {
-    if (interrupted() || clock.now_s() > end_s) return false;
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  }
-  return true;
-}
 
 }  // namespace
 
@@ -60,7 +49,7 @@ DvrkOutput::DvrkOutput(const DvrkOptions& options, bool has_joints) : options_(o
   const Address ecm = address_of(options.endoscope, "--endoscope");
   const SteadyClock clock;
   const ArmPose pose(transports_.get(ecm.transport, "--endoscope"), ecm.name, clock);
-  if (!wait_until([&] { return pose.newest().has_value(); }))
+  if (!wait_until([&] { return pose.newest().has_value(); }, wait_s))
     throw InputError("--endoscope",
                      fmt::format("is {}, of which no measured_cp came within {:.0f} s: {}", options.endoscope, wait_s,
                                  transports_.unpublished(options.endoscope, "--endoscope", "local/measured_cp")));
@@ -86,7 +75,7 @@ void DvrkOutput::publish(const Rigid3& camera_from_base) {
   Transport& transport = transports_.get(arm.transport, "--set-base-frame");
   const std::string topic = topic_of(arm.name, "set_base_frame");
   const auto say = transport.place_publisher(topic);
-  if (!wait_until([&] { return !transport.readers(topic).empty(); }))
+  if (!wait_until([&] { return !transport.readers(topic).empty(); }, wait_s))
     throw InputError("--set-base-frame", fmt::format("{} has no reader within {:.0f} s", topic, wait_s));
   // Again and again: a reader that is known here may not know this writer yet.
   constexpr int times = 10;

@@ -1,13 +1,11 @@
 #include "apps/lapservo/commands/servo/servo_arm.h"
 
-#include <chrono>
 #include <cstdio>
 #include <functional>
 #include <memory>
 #include <optional>
 #include <set>
 #include <string>
-#include <thread>
 #include <utility>
 
 #include <fmt/format.h>
@@ -125,27 +123,19 @@ int end_by_page() {
   return 1;
 }
 
-// Whether `holds` becomes true in time, before the user ends the run.
-bool wait_until(const std::function<bool()>& holds, Supervisor& arm, ServoPage* page, const Clock& clock) {
-  const double end_s = clock.now_s() + wait_s;
-  while (!interrupted() && clock.now_s() < end_s && !(page && page->command(arm, clock.now_s()))) {
-    if (holds()) return true;
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  }
-  return false;
-}
+// Waits until something holds, the user ends the run, or wait_s has passed; says whether it is one of the former two.
+using Wait = std::function<bool(const std::function<bool()>&)>;
 
 // Why the loop can't begin; empty where the arm's joints arrive and the camera's topic has a publisher.
-std::string wait_for_topics(const ServoOptions& options, Transports& transports, Supervisor& arm, ServoPage* page,
-                            const Clock& clock) {
-  if (!wait_until([&] { return arm.state().time_s > 0; }, arm, page, clock)) {
+std::string wait_for_topics(const ServoOptions& options, Transports& transports, Supervisor& arm, const Wait& wait) {
+  if (!wait([&] { return arm.state().time_s > 0; })) {
     const std::string why = transports.unpublished(options.robot, "--robot", "measured_js");
     return fmt::format("{}: no measured_js with the rig's joints within {:.0f} s{}", options.robot, wait_s,
                        why.empty() ? "" : ": " + why);
   }
   if (!names_topic(options.camera)) return {};
   std::string why;
-  wait_until([&] { return (why = transports.unpublished(options.camera, "--camera")).empty(); }, arm, page, clock);
+  wait([&] { return (why = transports.unpublished(options.camera, "--camera")).empty(); });
   return why.empty() ? "" : fmt::format("{}: no images within {:.0f} s: {}", options.camera, wait_s, why);
 }
 
@@ -203,10 +193,12 @@ int steer_arm(const ServoOptions& options) {
   }
   watch_for_interrupts();
   ServoPage* const its_page = page ? &*page : nullptr;
-  std::string missing = wait_for_topics(options, transports, arm, its_page, clock);
-  if (missing.empty() && endoscope && !wait_until([&] { return endoscope->begin(); }, arm, its_page, clock))
+  const auto ended_by_page = [&] { return page && page->command(arm, clock.now_s()); };
+  const Wait wait = [&](const auto& holds) { return wait_until([&] { return ended_by_page() || holds(); }, wait_s); };
+  std::string missing = wait_for_topics(options, transports, arm, wait);
+  if (missing.empty() && endoscope && !wait([&] { return endoscope->begin(); }))
     missing = fmt::format("{}: no measured_cp within {:.0f} s", options.endoscope, wait_s);
-  if (page && page->command(arm, clock.now_s())) return end_by_page();
+  if (ended_by_page()) return end_by_page();
   if (topics.name_is_in_use()) throw InputError("--rig", name_in_use(rig));
   if (!missing.empty()) {
     std::fprintf(stderr, "lapservo: %s\n", missing.c_str());
@@ -218,7 +210,7 @@ int steer_arm(const ServoOptions& options) {
 
   ChangingGoal goal(trajectory, config);
   ArmWatcher watcher(options, std::move(folder), arm, its_page, config, robot, images, topics, goal);
-  if (page && page->command(arm, clock.now_s())) return end_by_page();
+  if (ended_by_page()) return end_by_page();
   request_real_time(loop_priority);  // the robot has said what is not granted
   lapservo::run(arm, images, clock, config, goal.trajectory(), duration_s(options), watcher);
   say_counts(robot.counts(), images.counts());
