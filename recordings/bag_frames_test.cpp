@@ -99,7 +99,8 @@ class BagOfJoints {
 
 TEST(BagJoints, AreThoseOfTheRigInItsOrder) {
   const std::vector<std::string> names{"a", "b", "c", "d", "wrist"};
-  const BagOfJoints bag({{100, names, {1, 2, 3, 0.4, 5}},
+  const BagOfJoints bag({{0, {}, {}},  // of an arm that is not homed
+                         {100, names, {1, 2, 3, 0.4, 5}},
                          {100, names, {9, 9, 9, 9, 9}},  // the same stamp again
                          {100.5, names, {NAN, 2, 3, 0.4, 5}},
                          {0, names, {9, 9, 9, 9, 9}},
@@ -107,6 +108,7 @@ TEST(BagJoints, AreThoseOfTheRigInItsOrder) {
   const JointRecording recording = bag.read();
   EXPECT_EQ(recording.time_s, (std::vector<double>{1, 2}));
   EXPECT_EQ(recording.joints[1], (std::array<double, 4>{2, 1.5, 0.4, 3}));
+  EXPECT_EQ(recording.of_other_arms, 0);
   EXPECT_EQ(bag.names(), names);
 }
 

@@ -66,9 +66,11 @@ double clock_lead_s(const Bag& bag, const BagTopic& joints, const BagTopic* imag
 
 std::vector<std::string> joint_names_in_bag(const Bag& bag, const BagTopic& topic) {
   const auto messages = bag.messages(topic);
-  const auto message = messages->next();
-  const auto* reading = message ? std::get_if<JointMessage>(&*message) : nullptr;
-  return reading ? reading->names : std::vector<std::string>();
+  while (const auto message = messages->next()) {
+    const auto* reading = std::get_if<JointMessage>(&*message);
+    if (!reading || !reading->names.empty()) return reading ? reading->names : std::vector<std::string>();
+  }
+  return {};
 }
 
 JointRecording joints_in_bag(const Bag& bag, const BagTopic& topic, const Joints& joints,
@@ -79,6 +81,7 @@ JointRecording joints_in_bag(const Bag& bag, const BagTopic& topic, const Joints
   StampedMessages messages(bag.messages(topic), [&](const BagMessage& message) {
     const auto* reading = std::get_if<JointMessage>(&message);
     if (!reading || chosen(*reading, joints, source)) return true;
+    if (reading->names.empty()) return ++recording.no_numbers, false;  // dVRK 2.4 before the arm is homed
     ++recording.of_other_arms;
     other_names = reading->names;
     return false;

@@ -9,7 +9,7 @@
 
 namespace lapservo::internal {
 
-/// As the topic's first message has them.
+/// As the topic's first message that names any has them.
 std::vector<std::string> joint_names_in_bag(const Bag& bag, const BagTopic& topic);
 
 /// The arm's joints in a bag's topic, by the times of their headers' stamps (stamped_messages.h) after `begin_s`,

@@ -149,7 +149,7 @@ void Interlock::on_setpoint(const JointMessage& message, double arrival_s) {
   if (phase_ == Phase::idle) {
     names_ = message.names;
     places_ = *places;
-  } else if (config_.motion_enabled && (message.names != names_ || !is_ours(*setpoint_))) {
+  } else if (config_.motion_enabled && (message.names != names_ || !is_ours(*setpoint_) || goes_back(*setpoint_))) {
     on_foreign_command(arrival_s);
   } else {
     pass_wrist_through();
@@ -172,14 +172,32 @@ void Interlock::on_foreign_command(double arrival_s) {
 }
 
 // The arm may be late, round, and go straight from where it is to the next setpoint that it gets.
+std::optional<Interlock::Interval> Interlock::when_sent(const Reading& setpoint) const {
+  std::optional<Interval> when;
+  for (std::size_t i = 0; i < sent_.size(); ++i) {
+    const Sent &from = sent_[i], &to = sent_[std::min(i + 1, sent_.size() - 1)];
+    if (setpoint.time_s - to.time_s > memory_s || !lies_between(setpoint.q, from.q, to.q)) continue;
+    when = Interval{when ? when->begin_s : from.time_s, to.time_s};
+  }
+  return when;
+}
+
 bool Interlock::is_ours(const Reading& setpoint) const {
-  bool ours = lies_between(setpoint.q, last_, last_);
-  for (std::size_t i = 0; i + 1 < sent_.size() && !ours; ++i)
-    ours = setpoint.time_s - sent_[i + 1].time_s <= memory_s && lies_between(setpoint.q, sent_[i].q, sent_[i + 1].q);
+  bool ours = lies_between(setpoint.q, last_, last_) || when_sent(setpoint);
   for (std::size_t i = 0; i < others_.size() && ours; ++i)
     ours = std::find(places_.begin(), places_.end(), i) != places_.end() || is_wrist(i) ||
            std::abs(setpoint.positions[i] - others_[i]) <= same_other;
   return ours;
+}
+
+// Late as it may be, an arm does not go back on our path unless another program's commands alternate with ours, as in
+// teleoperation, which begins where the arm is.
+bool Interlock::goes_back(const Reading& setpoint) {
+  const auto when = when_sent(setpoint);
+  if (!when) return false;
+  if (when->end_s < passed_s_) return true;
+  passed_s_ = std::max(passed_s_, when->begin_s);
+  return false;
 }
 
 bool Interlock::is_wrist(std::size_t place) const {
@@ -280,6 +298,7 @@ void Interlock::start(double now_s) {
     velocity_.setZero();
     others_ = setpoint_->positions;
     sent_.push_back({now_s, last_});
+    passed_s_ = 0;
   }
   shift_ = last_ - path_->at(now_s).position;
   phase_ = Phase::following;

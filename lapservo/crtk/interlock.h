@@ -123,7 +123,13 @@ class Interlock {
   void begin_anew(double arrival_s);
   void watch_rest(double now_s);
   void start(double now_s);
+  struct Interval {
+    double begin_s = 0, end_s = 0;
+  };
+  /// Within the last second; nullopt for one that is not on that path.
+  std::optional<Interval> when_sent(const Reading& setpoint) const;
   bool is_ours(const Reading& setpoint) const;
+  bool goes_back(const Reading& setpoint);
   bool is_wrist(std::size_t place) const;
   void pass_wrist_through();
   Eigen::Vector4d within_limits(const Eigen::Vector4d& wanted) const;
@@ -160,6 +166,7 @@ class Interlock {
                   velocity_ = Eigen::Vector4d::Zero();
   std::vector<double> others_;  // all joints' setpoints at the start, of the wrist's as they pass through
   std::deque<Sent> sent_;       // of the last second
+  double passed_s_ = 0;         // the arm has reported all setpoints that were sent before
   std::optional<double> wrist_moved_s_;
   /// Where an arm was that we do not move, from when on, and when it left such a place last.
   struct Rest {

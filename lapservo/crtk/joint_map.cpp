@@ -87,6 +87,7 @@ std::string repeated_joint(const Joints& joints, const std::vector<std::string>&
 std::string unfit_joints(const Joints& joints, const std::vector<std::string>& names) {
   if (const std::string twice = repeated_joint(joints, names); !twice.empty())
     return fmt::format("joints are {}: {} stands there twice, expected each name once", fmt::join(names, ", "), twice);
+  if (names.empty()) return "measured_js names no joints: enable and home the arm";
   const auto other = other_names(joints);
   return fmt::format("joints are {}, expected {}{}{}", fmt::join(names, ", "), fmt::join(joints.names, ", "),
                      other ? fmt::format(" or {}", fmt::join(*other, ", ")) : "",

@@ -86,6 +86,7 @@ TEST(JointMap, FindsTheFourAmongOthersAndRefusesMissingAndRepeatedOnes) {
   EXPECT_FALSE(find_joints(psm(), {"outer_yaw", "outer_pitch", "outer_insertion"}));
   EXPECT_FALSE(find_joints(psm(), {"outer_yaw", "outer_pitch", "outer_insertion", "outer_roll", "outer_yaw"}));
   EXPECT_FALSE(find_joints(psm(), {}));
+  EXPECT_NE(unfit_joints(psm(), {}).find("home the arm"), std::string::npos);
   EXPECT_EQ(unfit_joints(psm(), {"outer_yaw", "outer_pitch", "outer_insertion", "outer_roll", "outer_yaw"}),
             "joints are outer_yaw, outer_pitch, outer_insertion, outer_roll, outer_yaw: outer_yaw stands there twice, "
             "expected each name once");

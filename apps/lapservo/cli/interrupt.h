@@ -8,7 +8,7 @@ namespace lapservo::app {
 void watch_for_interrupts();
 bool interrupted();
 
-/// Whether `holds` comes true before Ctrl-C and within this time. Asked a hundred times a second.
+/// Whether `holds` comes true before Ctrl-C and within this time; looks a hundred times a second.
 bool wait_until(const std::function<bool()>& holds, double at_most_s);
 
 }  // namespace lapservo::app

@@ -50,9 +50,12 @@ DvrkOutput::DvrkOutput(const DvrkOptions& options, bool has_joints) : options_(o
   const SteadyClock clock;
   const ArmPose pose(transports_.get(ecm.transport, "--endoscope"), ecm.name, clock);
   if (!wait_until([&] { return pose.newest().has_value(); }, wait_s))
-    throw InputError("--endoscope",
-                     fmt::format("is {}, of which no measured_cp came within {:.0f} s: {}", options.endoscope, wait_s,
-                                 transports_.unpublished(options.endoscope, "--endoscope", "local/measured_cp")));
+    throw InputError(
+        "--endoscope",
+        fmt::format(
+            "is {}, of which no measured_cp with a stamp came within {:.0f} s (a dVRK stamps it once the arm is "
+            "homed): {}",
+            options.endoscope, wait_s, transports_.unpublished(options.endoscope, "--endoscope", "local/measured_cp")));
   endoscope_ = pose.newest();
 }
 

@@ -197,7 +197,8 @@ int steer_arm(const ServoOptions& options) {
   const Wait wait = [&](const auto& holds) { return wait_until([&] { return ended_by_page() || holds(); }, wait_s); };
   std::string missing = wait_for_topics(options, transports, arm, wait);
   if (missing.empty() && endoscope && !wait([&] { return endoscope->begin(); }))
-    missing = fmt::format("{}: no measured_cp within {:.0f} s", options.endoscope, wait_s);
+    missing = fmt::format("{}: no measured_cp with a stamp within {:.0f} s (a dVRK stamps it once the arm is homed)",
+                          options.endoscope, wait_s);
   if (ended_by_page()) return end_by_page();
   if (topics.name_is_in_use()) throw InputError("--rig", name_in_use(rig));
   if (!missing.empty()) {
