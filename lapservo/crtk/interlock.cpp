@@ -48,9 +48,10 @@ double approach_speed(double left, double acceleration) {
   return std::min(left / time_constant_s, std::sqrt(acceleration * left));
 }
 
-// Whether a point lies beside the line between two others.
-bool lies_between(const Eigen::Vector4d& q, const Eigen::Vector4d& from, const Eigen::Vector4d& to) {
-  const Eigen::Vector4d way = (to - from).cwiseQuotient(same_q), off = (q - from).cwiseQuotient(same_q);
+// Whether a point lies beside the line between two others, as far as this part of same_q.
+bool lies_between(const Eigen::Vector4d& q, const Eigen::Vector4d& from, const Eigen::Vector4d& to, double near = 1) {
+  const Eigen::Vector4d unit = near * same_q, way = (to - from).cwiseQuotient(unit),
+                        off = (q - from).cwiseQuotient(unit);
   const double length2 = way.squaredNorm();
   const double part = length2 > 0 ? std::clamp(off.dot(way) / length2, 0.0, 1.0) : 0;
   return ((off - part * way).array().abs() <= 1).all();
@@ -172,18 +173,18 @@ void Interlock::on_foreign_command(double arrival_s) {
 }
 
 // The arm may be late, round, and go straight from where it is to the next setpoint that it gets.
-std::optional<Interlock::Interval> Interlock::when_sent(const Reading& setpoint) const {
+std::optional<Interlock::Interval> Interlock::when_sent(const Reading& setpoint, double near) const {
   std::optional<Interval> when;
   for (std::size_t i = 0; i < sent_.size(); ++i) {
     const Sent &from = sent_[i], &to = sent_[std::min(i + 1, sent_.size() - 1)];
-    if (setpoint.time_s - to.time_s > memory_s || !lies_between(setpoint.q, from.q, to.q)) continue;
+    if (setpoint.time_s - to.time_s > memory_s || !lies_between(setpoint.q, from.q, to.q, near)) continue;
     when = Interval{when ? when->begin_s : from.time_s, to.time_s};
   }
   return when;
 }
 
 bool Interlock::is_ours(const Reading& setpoint) const {
-  bool ours = lies_between(setpoint.q, last_, last_) || when_sent(setpoint);
+  bool ours = lies_between(setpoint.q, last_, last_) || when_sent(setpoint, 1);
   for (std::size_t i = 0; i < others_.size() && ours; ++i)
     ours = std::find(places_.begin(), places_.end(), i) != places_.end() || is_wrist(i) ||
            std::abs(setpoint.positions[i] - others_[i]) <= same_other;
@@ -193,7 +194,8 @@ bool Interlock::is_ours(const Reading& setpoint) const {
 // Late as it may be, an arm does not go back on our path unless another program's commands alternate with ours, as in
 // teleoperation, which begins where the arm is.
 bool Interlock::goes_back(const Reading& setpoint) {
-  const auto when = when_sent(setpoint);
+  constexpr double exactly = 0.1;  // of an arm that rounds more nothing is known
+  const auto when = when_sent(setpoint, exactly);
   if (!when) return false;
   if (when->end_s < passed_s_) return true;
   passed_s_ = std::max(passed_s_, when->begin_s);

@@ -126,8 +126,8 @@ class Interlock {
   struct Interval {
     double begin_s = 0, end_s = 0;
   };
-  /// Within the last second; nullopt for one that is not on that path.
-  std::optional<Interval> when_sent(const Reading& setpoint) const;
+  /// Within the last second; nullopt for one that is farther from that path than `near` times same_q.
+  std::optional<Interval> when_sent(const Reading& setpoint, double near) const;
   bool is_ours(const Reading& setpoint) const;
   bool goes_back(const Reading& setpoint);
   bool is_wrist(std::size_t place) const;
