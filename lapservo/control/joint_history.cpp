@@ -12,6 +12,13 @@ void JointHistory::push(double time_s, const Eigen::Vector4d& q) {
   ++size_;
 }
 
+bool JointHistory::pauses(double from_s, double to_s) const {
+  constexpr double longest_s = 0.1;
+  for (std::size_t i = size_; i-- > 1 && entry(i).time_s >= from_s;)
+    if (entry(i - 1).time_s <= to_s && entry(i).time_s - entry(i - 1).time_s > longest_s) return true;
+  return false;
+}
+
 std::optional<Eigen::Vector4d> JointHistory::at(double time_s) const {
   if (size_ == 0 || !(time_s >= oldest_s())) return std::nullopt;
   if (time_s >= newest_s()) return entry(size_ - 1).q;

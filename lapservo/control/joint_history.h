@@ -27,6 +27,10 @@ class JointHistory {
   /// Linear interpolation; the newest reading for times after it, nullopt for times before the oldest.
   std::optional<Eigen::Vector4d> at(double time_s) const;
 
+  /// Whether the readings pause for more than 0.1 s somewhere within [from_s, to_s]: how joints moved meanwhile is
+  /// not known.
+  bool pauses(double from_s, double to_s) const;
+
   /// Calls visit(q) for the measured joints from after `from_s` up to `to_s`, in order.
   template <class Visit>
   void visit(double from_s, double to_s, const Visit& visit) const {

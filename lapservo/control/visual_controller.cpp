@@ -167,6 +167,11 @@ HoldReason VisualController::update(const ImageMeasurement& image) {
   // A repeated or older stamp carries no information: the age of the last measurement goes on growing.
   if (image_s_ && image.time_s <= *image_s_) return image_reason_;
   image_s_ = image.time_s;
+  constexpr double compared_s = 0.3;
+  if (history_.pauses(image.time_s - compared_s, image.time_s)) {
+    frozen_image_ = FrozenImage(config_.scales);
+    image_response_.interrupt();
+  }
   const FrozenImage::Verdict verdict = frozen_image_.add(image, history_);
   if (verdict == FrozenImage::Verdict::frozen) return HoldReason::frozen_image;
   if (verdict == FrozenImage::Verdict::again) return image_reason_;

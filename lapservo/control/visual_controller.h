@@ -58,7 +58,8 @@ class VisualController {
   void resume(const FeatureModel& model);
   /// Where the joints were measured when that image was exposed; nullopt when not known.
   std::optional<Eigen::Vector4d> measured_at(const ImageMeasurement& image) const {
-    return history_.at(image.time_s - delay_s());
+    const double time_s = image.time_s - delay_s();
+    return history_.pauses(time_s, time_s) ? std::nullopt : history_.at(time_s);
   }
 
   /// `image` is given once, in the first step after it arrived; `desired` is for the time `time_s`; `readings`: see

@@ -494,6 +494,29 @@ TEST(VisualController, JointsThatWereSetFreezeNoPicture) {
   EXPECT_NE(reason, HoldReason::frozen_image);
 }
 
+// Images that were taken during a pause of the joints' readings, and come after it: the arm stood still until its end.
+TEST(VisualController, APauseOfTheJointsFreezesNoPicture) {
+  constexpr double pause_s = 1, end_s = 1.4, latency_s = 0.1;
+  const ControllerConfig config = testing::test_config({});
+  const FeatureModel model = testing::model_of({});
+  VisualController controller(config, model);
+  controller.expect_following(false);
+  const auto q_at = [](double t) { return Eigen::Vector4d(t < end_s ? 0.05 : 0.053, 1.57, 0.064, 1.2); };
+  DesiredFeatures desired;
+  desired.features = model(q_at(0)).value().features;
+  Eigen::Vector4d measured = q_at(0);
+  for (int k = 0; k < 120; ++k) {
+    const double time_s = k * config.period_s, image_s = time_s - latency_s;
+    std::vector<JointReading> readings;
+    if (time_s < pause_s || time_s >= end_s) {
+      measured = q_at(time_s);
+      readings.push_back({time_s, JointVector::from_vector(measured)});
+    }
+    const auto image = testing::image_of(model(q_at(image_s)).value(), image_s);
+    EXPECT_NE(controller.step(time_s, measured, image, desired, readings).reason, HoldReason::frozen_image) << time_s;
+  }
+}
+
 class Holding : public ::testing::TestWithParam<ControlMode> {
  protected:
   ControllerConfig config_for(const Flaws& flaws) const {
