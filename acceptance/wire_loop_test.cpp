@@ -36,11 +36,9 @@
 #include "lapservo/testing/temporary_folder.h"
 #include "lapservo/testing/wait_for.h"
 #include "transports/named_transport.h"
+#include "transports/test_master.h"
 #ifdef LAPSERVO_WEB
 #include "web/test_http.h"
-#endif
-#ifdef LAPSERVO_ROS1
-#include "transports/ros1/test_ros_master.h"
 #endif
 
 namespace lapservo::internal {
@@ -188,9 +186,7 @@ class WireLoop : public ::testing::TestWithParam<std::string> {
   void SetUp() override {
     ::setenv("ROS_LOCALHOST_ONLY", "1", 1);
     if (!std::getenv("ROS_DOMAIN_ID")) ::setenv("ROS_DOMAIN_ID", "88", 1);
-#ifdef LAPSERVO_ROS1
-    if (GetParam() == "ros1") master_ = std::make_unique<TestRosMaster>();
-#endif
+    master_ = master_of(GetParam());
     rig_ = testing::small_test_rig();
     testing::write_file(folder_ / "rig.yaml", rig_yaml(rig_));
     testing::write_file(folder_ / "limits.yaml",
@@ -207,12 +203,8 @@ class WireLoop : public ::testing::TestWithParam<std::string> {
     }
     testing::write_file(folder_ / "v-d.csv", csv);
   }
-  std::string file(const std::string& name) const {
-    return (folder_ / name).string();
-  }
-  std::string said(const std::string& name = "servo.txt") const {
-    return testing::read_file(folder_ / name);
-  }
+  std::string file(const std::string& name) const { return (folder_ / name).string(); }
+  std::string said(const std::string& name = "servo.txt") const { return testing::read_file(folder_ / name); }
   void expect_said(const std::string& words, const std::string& name = "servo.txt") const {
     EXPECT_NE(said(name).find(words), std::string::npos) << "no '" << words << "' in: " << said(name);
   }
@@ -320,9 +312,7 @@ class WireLoop : public ::testing::TestWithParam<std::string> {
   Rig rig_;
   testing::TemporaryFolder folder_;
   int setpoint_readers_ = 2;  // the arm and this process's ears
-#ifdef LAPSERVO_ROS1
-  std::unique_ptr<TestRosMaster> master_;
-#endif
+  std::shared_ptr<void> master_;
   std::unique_ptr<Arm> room_;
   std::unique_ptr<Transport> ears_;
   Transport::Publisher<StringMessage> command_;
