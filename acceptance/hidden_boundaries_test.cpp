@@ -117,21 +117,13 @@ class HiddenBoundaries : public ::testing::Test {
   }
 };
 
-TEST_F(HiddenBoundaries, OfBandsThatAreOffGiveNoWrongRotation) {
-  const Tally all = all_kinds(pictures, 1, Off::bands);
-  EXPECT_EQ(all.wrong, 0);
-}
-
-// With the other inner boundary hidden, what is left of such a print is that of one that is turned.
-TEST_F(HiddenBoundaries, OfAnInkThatIsOffGiveNoWrongRotation) {
-  const Tally all = all_kinds(pictures, 1, Off::middle_ink);
-  EXPECT_EQ(all.wrong, 0);
+// With the other inner boundary hidden, what is left of an ink that is off is that of a marker that is turned.
+TEST_F(HiddenBoundaries, OfPrintsThatAreOffGiveNoWrongRotation) {
+  for (const Off off : {Off::bands, Off::middle_ink}) EXPECT_EQ(all_kinds(pictures, 1, off).wrong, 0);
 }
 
 TEST_F(HiddenBoundaries, OfPrintsThatAreOffGiveNoneWhileTracked) {
-  Tally all = all_kinds((pictures + 3) / 4, 8, Off::bands);
-  all.add(all_kinds((pictures + 3) / 4, 8, Off::middle_ink));
-  EXPECT_EQ(all.wrong, 0);
+  for (const Off off : {Off::bands, Off::middle_ink}) EXPECT_EQ(all_kinds((pictures + 3) / 4, 8, off).wrong, 0);
 }
 
 // The refusals of misprinted markers cost some exact ones.

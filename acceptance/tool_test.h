@@ -37,6 +37,11 @@ class ToolTest : public ::testing::Test {
   static void expect_done(const std::string& arguments, const std::string& before = "") {
     EXPECT_EQ(run(arguments, before), 0) << arguments << ": " << errors() << output();
   }
+  /// Exit code 1, and all the words in what it says.
+  static void expect_failed(const std::string& arguments, const std::vector<std::string>& words) {
+    EXPECT_EQ(run(arguments), 1) << arguments << ": " << errors();
+    for (const std::string& word : words) expect_in(errors() + output(), word);
+  }
   /// Exit code 2, and one line that holds all the words.
   static void expect_refused(const std::string& arguments, const std::vector<std::string>& words,
                              const std::string& before = "") {

@@ -69,18 +69,24 @@ Shown shown(const std::string& bytes, const std::string& format, const cv::Size&
   return {pipeline, open_camera_or_file("gst:" + pipeline, 30)->next()};
 }
 
+// Within so many levels where a channel is black, and elsewhere.
+void expect_colours(const std::string& pipeline, const std::optional<Frame>& image, int within_black, int within) {
+  ASSERT_TRUE(image) << pipeline;
+  for (std::size_t i = 0; i < colours.size(); ++i) {
+    const auto bgr = image->bgr.at<cv::Vec3b>(height / 2, static_cast<int>(i) * bar + bar / 2);
+    for (std::size_t channel = 0; channel < 3; ++channel)
+      EXPECT_NEAR(bgr[2 - static_cast<int>(channel)], colours[i][channel], colours[i][channel] ? within : within_black)
+          << pipeline << ", colour " << i;
+  }
+}
+
 TEST(Colours, AreThoseOfTheCapsColorimetry) {
   for (const char* format : {"i420", "nv12", "yuy2"}) {
     for (const Matrix& matrix : matrices) {
       for (const bool full_range : {false, true}) {
         const auto [pipeline, image] =
             shown(bars(format, matrix, full_range), format, {width, height}, colorimetry(matrix, full_range));
-        ASSERT_TRUE(image) << pipeline;
-        for (std::size_t i = 0; i < colours.size(); ++i) {
-          const auto bgr = image->bgr.at<cv::Vec3b>(height / 2, static_cast<int>(i) * bar + bar / 2);
-          for (std::size_t channel = 0; channel < 3; ++channel)
-            EXPECT_NEAR(bgr[2 - static_cast<int>(channel)], colours[i][channel], 2) << pipeline << ", colour " << i;
-        }
+        expect_colours(pipeline, image, 2, 2);
       }
     }
   }
@@ -99,13 +105,7 @@ TEST(Colours, AreLightAsTheCapsTransferSays) {
                                     {transfer.grey, transfer.grey, transfer.grey}};
     const auto [pipeline, image] = shown(bars("i420", matrices[1], true, values), "i420", {width, height},
                                          fmt::format("1:3:{}:1", transfer.number));
-    ASSERT_TRUE(image) << pipeline;
-    for (std::size_t i = 0; i < colours.size(); ++i) {
-      const auto bgr = image->bgr.at<cv::Vec3b>(height / 2, static_cast<int>(i) * bar + bar / 2);
-      for (std::size_t channel = 0; channel < 3; ++channel)
-        EXPECT_NEAR(bgr[2 - static_cast<int>(channel)], colours[i][channel], colours[i][channel] == 0 ? 25 : 6)
-            << pipeline << ", colour " << i;  // of black 8 bits of linear light hold little
-    }
+    expect_colours(pipeline, image, 25, 6);  // of black 8 bits of linear light hold little
   }
 }
 

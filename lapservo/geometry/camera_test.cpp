@@ -57,16 +57,6 @@ TEST(Camera, IdealAndRawPixelsRoundTripOverTheImage) {
       }
 }
 
-TEST(Camera, DistortionVanishesAtThePrincipalPointAndBendsInwardsForABarrel) {
-  for (const auto& [name, camera] : lenses()) {
-    const Eigen::Vector2d centre_px(camera.cx_px, camera.cy_px);
-    EXPECT_LT((camera.raw_from_ideal(centre_px) - centre_px).norm(), 1e-12) << name;
-  }
-  const Camera barrel = lenses()[1].camera;
-  const Eigen::Vector2d corner_px(1279, 719), centre_px(barrel.cx_px, barrel.cy_px);
-  EXPECT_LT((barrel.raw_from_ideal(corner_px) - centre_px).norm(), (corner_px - centre_px).norm());
-}
-
 // The model's formula written out once more, for one point, from the ROS camera_info documentation.
 TEST(Camera, PlumbBobOfOnePoint) {
   const Camera camera = camera_with({-0.3, 0.1, 0.002, -0.001, 0.05});

@@ -65,27 +65,6 @@ TEST(Cylinder, AzimuthsBetweenTheSilhouettesFaceTheCameraAndOthersDoNot) {
   });
 }
 
-TEST(Cylinder, TheFacingGeneratrixIsSeenOnTheAxis) {
-  for_random_shafts([](const Rigid3& pose, const CylinderView& view, double along_m) {
-    const Eigen::Vector3d facing = pose * surface_point(radius_m, view.facing_azimuth_rad, along_m);
-    const Eigen::Vector3d axis_plane = (pose * Eigen::Vector3d(0, 0, 0)).cross(pose * Eigen::Vector3d(0, 0, 0.1));
-    EXPECT_NEAR(facing.normalized().dot(axis_plane.normalized()), 0, 1e-9);
-    EXPECT_LT(normal_in_camera(pose, view.facing_azimuth_rad).dot(facing), 0);
-  });
-}
-
-TEST(Cylinder, TurningTheShaftAboutItsAxisTurnsOnlyTheAzimuth) {
-  for_random_shafts([](const Rigid3& pose, const CylinderView& view, double along_m) {
-    const double angle_rad = 40 * along_m;
-    const Rigid3 turn{Eigen::Quaterniond(Eigen::AngleAxisd(angle_rad, Eigen::Vector3d::UnitZ())), {0, 0, along_m}};
-    const auto turned = view_cylinder(pose * turn, radius_m);
-    ASSERT_TRUE(turned);
-    EXPECT_NEAR(wrap_pi(turned->facing_azimuth_rad + angle_rad - view.facing_azimuth_rad), 0, 1e-9);
-    EXPECT_NEAR(turned->camera_to_axis_m, view.camera_to_axis_m, 1e-12);
-    EXPECT_NEAR(turned->half_visible_rad, view.half_visible_rad, 1e-9);
-  });
-}
-
 TEST(Cylinder, ACameraInsideTheShaftSeesNothing) {
   const Rigid3 along_the_view{Eigen::Quaterniond::Identity(), {0.004, 0, 0.1}};
   EXPECT_FALSE(view_cylinder(along_the_view, radius_m));

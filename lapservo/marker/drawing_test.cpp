@@ -213,19 +213,6 @@ TEST(PrintSheet, WrappedAroundTheShaftGivesTheBoundariesThatTheMarkerPredicts) {
   }
 }
 
-TEST(PrintSheet, IsAsWideAsTheShaftIsAround) {
-  for (const double diameter_m : {0.005, 0.0084, 0.012}) {
-    Marker marker = example;
-    marker.diameter_m = diameter_m;
-    for_sheets(marker, Paper::a4, 1, [&](const Page& page) {
-      for (const double hue_deg : marker.hues_deg)
-        EXPECT_NEAR(bands_of(page, hue_deg).at(0).box().sizes().y(), 1e3 * pi * diameter_m, rounding_mm);
-      const Eigen::AlignedBox2d first = bands_of(page, 90).at(0).box(), last = bands_of(page, 270).at(0).box();
-      EXPECT_NEAR(last.max().x() - first.min().x(), 24, rounding_mm);
-    });
-  }
-}
-
 TEST(PrintSheet, HasTheSizeOfItsPaper) {
   for (const auto& [paper, size_mm] : {std::pair(Paper::a4, Vector2d(210, 297)), {Paper::letter, {215.9, 279.4}}})
     for_sheets(example, paper, 1, [expected_mm = Vector2d(size_mm)](const Page& page) {

@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <filesystem>
 #include <limits>
-#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -98,19 +97,10 @@ instruments:
             expected);
 }
 
-TEST(Rig, ReadsEveryResponse) {
-  const auto response = [](const std::string& text) {
-    return parse_rig(with("gamma:2.2", text), "rig.yaml").camera.response;
-  };
-  EXPECT_EQ(response("srgb").kind, Response::Kind::srgb);
-  EXPECT_EQ(response("linear").kind, Response::Kind::power);
-  EXPECT_EQ(response("linear").gamma, 1);
-  EXPECT_EQ(response("gamma:1.8").gamma, 1.8);
-  EXPECT_EQ(response("rec709").kind, Response::Kind::rec709);
-  const Response table = response("{light: [0, 0.2, 1], value: [0, 0.5, 1], sigma_light: [0, 0.01, 0]}");
-  EXPECT_EQ(table.kind, Response::Kind::table);
-  EXPECT_EQ(table.table_light, (std::vector<double>{0, 0.2, 1}));
-  EXPECT_EQ(table.table_value, (std::vector<double>{0, 0.5, 1}));
+// The others are read as RigWriter writes them.
+TEST(Rig, ReadsALinearResponse) {
+  const Response linear{Response::Kind::power, 1};
+  EXPECT_EQ(parse_rig(with("gamma:2.2", "linear"), "rig.yaml").camera.response, linear);
 }
 
 // Keys that ROS's camera_calibration and calibrate write beside those that a rig needs.
@@ -175,6 +165,7 @@ const Complaints wrong_types{
     {with("1280", "1280px"), "camera.image_width: is 1280px, " + pixels},
     {with("  response", "  deinterlace: 1\n  response"), "camera.deinterlace: is 1, expected true or false"},
     {with("639.5", "centre"), "camera.camera_matrix.data[2]: is centre, " + finite},
+    {with("[-0.1", "[nan"), "camera.distortion_coefficients.data[0]: is nan, " + finite},
     {with("0, 0, 1]}", "0, 0]}"),
      "camera.camera_matrix.data: is a list of 8, expected nine numbers, fx 0 cx 0 fy cy 0 0 1"},
     {with("[-0.1, 0.02, ", "["),
@@ -194,15 +185,6 @@ const Complaints wrong_types{
      "instruments[0].camera_from_rcm: is 3, expected a map with 'translation_m'"},
 };
 
-const Complaints non_finite_numbers{
-    {with("1280", ".nan"), "camera.image_width: is .nan, " + pixels},
-    {with("[1100", "[.inf"), "camera.camera_matrix.data[0]: is .inf, " + finite},
-    {with("[-0.1", "[nan"), "camera.distortion_coefficients.data[0]: is nan, " + finite},
-    {with("gamma:2.2", "gamma:nan"), "camera.response: is gamma:nan, " + response},
-    {with("0.0084", "inf"), marker + "diameter_m: is inf, " + diameter},
-    {with("0.0672", "nan"), from_rcm + "translation_m[1]: is nan, expected a length within 10 m"},
-};
-
 const Complaints impossible_cameras{
     {with("1280", "0"), "camera.image_width: is 0, " + pixels},
     {with("720", "1e6"), "camera.image_height: is 1e6, " + pixels},
@@ -220,9 +202,6 @@ const Complaints impossible_cameras{
 // Some rigs with an invalid marker; MarkerProblem tests the rest.
 const Complaints impossible_instruments{
     {with("0.0001", "-0.0001"), marker + "tolerance_m: is -0.0001, expected 0 to 0.005 (metres)"},
-    {with("[0.0095, 0.0094, 0.0051]", "[0.0035, 0.0036, 0.0169]"),
-     "instruments[0].marker: " + not_decodable +
-         "the cross-ratio is the same at every rotation: the inner boundaries must slope"},
     {with("[0.0095, 0.0094, 0.0051]", "[0.0165, 0.0036, 0.0039]"),
      "instruments[0].marker: " + not_decodable +
          "the cross-ratio turns back near tau = 3.25 rad, so that two rotations look the same"},
@@ -291,9 +270,8 @@ const Complaints confusable_instruments{
 };
 
 TEST(Rig, IsRefusedInOneLineNamingFileFieldValueAndExpectation) {
-  for (const Complaints& complaints :
-       {missing_keys, wrong_types, non_finite_numbers, impossible_cameras, impossible_instruments, misunderstandings,
-        impossible_joints, confusable_instruments})
+  for (const Complaints& complaints : {missing_keys, wrong_types, impossible_cameras, impossible_instruments,
+                                       misunderstandings, impossible_joints, confusable_instruments})
     for (const auto& [yaml, expected] : complaints) EXPECT_EQ(error_of(yaml), "rig.yaml: " + expected);
 }
 
@@ -333,25 +311,12 @@ TEST(Rig, RefusesWhatIsNotYaml) {
   EXPECT_EQ(error_of(std::string(2 << 20, ' ')), "rig.yaml: is larger than 1 MiB, expected a rig file");
 }
 
-TEST(LoadRig, FindsTheCameraFileBesideTheRig) {
+TEST(LoadRig, NamesTheCamerasFileThatIsWrong) {
   const testing::TemporaryFolder folder;
-  const std::size_t begin = good.find("  image_width"), end = good.find("instruments:");
-  std::string camera = good.substr(begin, end - begin);
-  for (std::size_t at = 0; (at = camera.find("  ", at)) != std::string::npos;) camera.erase(at, 2);
-  fs::create_directory(folder / "cameras");
-  testing::write_file(folder / "cameras/endoscope.yaml", camera);
-  testing::write_file(folder / "rig.yaml", "camera: cameras/endoscope.yaml\n" + good.substr(end));
-  const Rig rig = load_rig(folder / "rig.yaml");
-  EXPECT_EQ(rig.camera.width_px, 1280);
-  EXPECT_EQ(rig.camera.response.gamma, 2.2);
-
-  const std::string camera_path = (folder / "cameras/endoscope.yaml").string();
-  testing::write_file(camera_path, "image_width: wide");
+  testing::write_file(folder / "camera.yaml", "image_width: wide");
+  testing::write_file(folder / "rig.yaml", "camera: camera.yaml\n" + good.substr(good.find("instruments:")));
   EXPECT_EQ(input_error([&] { load_rig(folder / "rig.yaml"); }),
-            camera_path + ": image_width: is wide, expected a whole number of pixels, 16 to 16384");
-  fs::remove(camera_path);
-  EXPECT_EQ(input_error([&] { load_rig(folder / "rig.yaml"); }),
-            camera_path + ": can't be opened, expected a YAML file");
+            (folder / "camera.yaml").string() + ": image_width: is wide, " + pixels);
 }
 
 TEST(LoadRig, NamesTheFileThatCanNotBeRead) {
@@ -397,19 +362,15 @@ TEST(Rig, OfALensThatFoldsInTheCornersAloneIsTaken) {
   EXPECT_TRUE(rig.camera.ideal_from_raw({639.5, 0}));
 }
 
-// As calibrate registration writes it, and as ROS orders it.
-TEST(Rig, HoldsTheRegistrationsCovariance) {
+TEST(Rig, WhoseRegistrationsCovarianceIsNotSymmetricIsRefused) {
   const auto text = [](const std::string& number) {
-    std::string numbers;
-    for (int i = 0; i < 36; ++i)
-      numbers += (i ? ", " : "") + (i == 6 ? number : i % 7 == 0 ? "1e-6" : i == 1 ? "5e-7" : "0");
+    std::string numbers = "1e-6, " + number;
+    for (int i = 2; i < 36; ++i) numbers += i % 7 == 0 ? ", 1e-6" : i == 6 ? ", 5e-7" : ", 0";
     return with("    camera_from_rcm:\n",
                 "    camera_from_rcm:\n      covariance: {rows: 6, cols: 6, data: [" + numbers + "]}\n");
   };
-  const Rig rig = parse_rig(text("5e-7"), "rig.yaml");
-  ASSERT_TRUE(rig.instruments[0].registration_covariance);
-  EXPECT_EQ((*rig.instruments[0].registration_covariance)(0, 1), 5e-7);
-  EXPECT_THROW(parse_rig(text("4e-7"), "rig.yaml"), InputError) << "not symmetric";
+  EXPECT_EQ(error_of(text("5e-7")), "");
+  EXPECT_NE(error_of(text("4e-7")), "");
 }
 
 // Put together in a program.

@@ -17,12 +17,7 @@ namespace {
 // The example's scene, a third as large.
 Rig small_rig() {
   Rig rig = load_rig(testing::source_folder() / "configs/example.yaml");
-  Camera& camera = rig.camera;
-  camera.width_px = 426;
-  camera.height_px = 240;
-  camera.fx_px = camera.fy_px = 366;
-  camera.cx_px = 212.5;
-  camera.cy_px = 119.5;
+  rig.camera = {426, 240, 366, 366, 212.5, 119.5, {}, {}};
   return rig;
 }
 

@@ -40,4 +40,11 @@ inline Marker random_marker(Random& random) {
   return marker_with(upper_m, random_bands(length_m, random));
 }
 
+/// Wrapped askew, cut askew, with a gap.
+inline Marker askew(Marker marker, Random& random) {
+  marker.wrap_m = random.uniform(-2e-3, 2e-3), marker.gap_rad = random.uniform(0, 0.5);
+  marker.skew_m = random.uniform(-1e-3, 1e-3), marker.bands_lower_m[2] += marker.skew_m;
+  return marker;
+}
+
 }  // namespace lapservo::testing

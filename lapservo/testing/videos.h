@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <cstdlib>
 #include <filesystem>
+#include <span>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -63,6 +64,24 @@ inline bool write_by_ffmpeg(const std::filesystem::path& path, const cv::Mat& bg
                             std::to_string(bgr.cols) + "x" + std::to_string(bgr.rows) + " -r 25 -i '" +
                             (folder / "raw").string() + "' ";
   return ffmpeg(input + arguments + " '" + path.string() + "'");
+}
+
+inline constexpr int patch_px = 64;
+
+/// Patches of these colours, one beside the other.
+inline cv::Mat patches_of(std::span<const cv::Vec3b> colours, int height_px) {
+  cv::Mat bgr(height_px, patch_px * static_cast<int>(colours.size()), CV_8UC3);
+  for (int i = 0; i < static_cast<int>(colours.size()); ++i)
+    bgr.colRange(patch_px * i, patch_px * (i + 1)).setTo(colours[static_cast<std::size_t>(i)]);
+  return bgr;
+}
+
+inline void expect_patches(const cv::Mat& bgr, std::span<const cv::Vec3b> colours, int tolerance) {
+  for (int i = 0; i < static_cast<int>(colours.size()); ++i)
+    for (int channel = 0; channel < 3; ++channel)
+      EXPECT_NEAR(bgr.at<cv::Vec3b>(bgr.rows / 2, i * patch_px + patch_px / 2)[channel],
+                  colours[static_cast<std::size_t>(i)][channel], tolerance)
+          << "patch " << i << ", " << channel;
 }
 
 /// The bytes with 200 of them, from `from` on, drawn at random.

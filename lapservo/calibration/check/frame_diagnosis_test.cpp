@@ -32,6 +32,11 @@ class FrameDiagnosisTest : public ::testing::Test {
     }
     return diagnosis.text();
   }
+  Observation refused(Status status) const {
+    Observation seen;
+    seen.status = status, seen.instrument = rig.instruments[0].name;
+    return seen;
+  }
   static void expect_names(const std::string& text, const std::string& word) {
     EXPECT_NE(text.find(word), std::string::npos) << text;
   }
@@ -44,7 +49,7 @@ TEST_F(FrameDiagnosisTest, IsSilentWhereAllIsWell) {
 TEST_F(FrameDiagnosisTest, NamesTheCauseWhereNothingIsFound) {
   const auto diagnose = [&](auto change) { return text(rig, change); };
   expect_names(diagnose([](cv::Mat& bgr) { cv::cvtColor(bgr, bgr, cv::COLOR_BGR2RGB); }), "red and blue are exchanged");
-  expect_names(diagnose([](cv::Mat& bgr) { cv::flip(bgr, bgr, 1); }), "mirrored");
+  expect_names(diagnose([](cv::Mat& bgr) { cv::flip(bgr, bgr, 1); }), "mirroring off");
   expect_names(diagnose([](cv::Mat& bgr) { bgr /= 16; }), "the frames are dark");
   expect_names(diagnose([](cv::Mat& bgr) {
                  cv::cvtColor(bgr, bgr, cv::COLOR_BGR2GRAY);
@@ -86,11 +91,8 @@ TEST_F(FrameDiagnosisTest, NamesWhatElseTheRigWouldHaveToSay) {
 }
 
 TEST_F(FrameDiagnosisTest, NamesCompressionOverexposureAndATurnedCamera) {
-  Observation refused;
-  refused.status = Status::poor_fit;
-  refused.instrument = rig.instruments[0].name;
   FrameDiagnosis diagnosis(rig);
-  for (int i = 0; i < frames; ++i) diagnosis.add(scenes::render_nothing(rig, 7), {refused});
+  for (int i = 0; i < frames; ++i) diagnosis.add(scenes::render_nothing(rig, 7), {refused(Status::poor_fit)});
   expect_names(diagnosis.text(true), "12 of 12 frames are poor_fit, and the recording is compressed");
   expect_names(diagnosis.text(false), "compare diameter_m and bands");
   expect_names(text(rig, [](cv::Mat& bgr) { bgr.convertTo(bgr, -1, 4, 120); }), "overexposed");
@@ -117,10 +119,7 @@ TEST_F(FrameDiagnosisTest, NamesFramesOfTwoMoments) {
   for (const auto& [status, remedy] :
        {std::pair(Status::interlaced, "--deinterlace"), std::pair(Status::blended, "noise reduction over time")}) {
     FrameDiagnosis diagnosis(rig);
-    Observation refused;
-    refused.status = status;
-    refused.instrument = rig.instruments[0].name;
-    for (int i = 0; i < frames; ++i) diagnosis.add(bgr, {refused});
+    for (int i = 0; i < frames; ++i) diagnosis.add(bgr, {refused(status)});
     expect_names(diagnosis.text(), remedy);
   }
 }

@@ -9,12 +9,8 @@
 namespace lapservo::internal {
 namespace {
 
-Marker askew_marker(Random& random) {
-  Marker marker = lapservo::testing::random_marker(random);
-  marker.wrap_m = random.uniform(-2e-3, 2e-3), marker.gap_rad = random.uniform(0, 0.4);
-  marker.skew_m = random.uniform(-1e-3, 1e-3), marker.bands_lower_m[2] += marker.skew_m;
-  return marker;
-}
+using lapservo::testing::askew;
+using lapservo::testing::random_marker;
 
 void expect_same(const Marker& a, const Marker& b) {
   for (std::size_t i = 0; i < 3; ++i) {
@@ -29,14 +25,14 @@ void expect_same(const Marker& a, const Marker& b) {
 TEST(PrintShape, GivesTheMarkerBack) {
   Random random(1);
   for (int i = 0; i < 100; ++i) {
-    const Marker marker = askew_marker(random);
+    const Marker marker = askew(random_marker(random), random);
     expect_same(PrintShape::of(marker).on(marker), marker);
   }
 }
 
 TEST(PrintShape, SigmasAreThoseOfTheMarkersNumbers) {
   Random random(2);
-  const Marker marker = askew_marker(random);
+  const Marker marker = askew(random_marker(random), random);
   PrintCovariance factor;
   for (double& value : factor.reshaped()) value = 1e-5 * random.normal();
   const PrintCovariance covariance = factor * factor.transpose();

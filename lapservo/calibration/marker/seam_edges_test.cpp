@@ -28,16 +28,9 @@ struct GapShot {
     q.psi_rad = view.value().facing_azimuth_rad - marker.seam_rad + marker.gap_rad / 2 + beside_rad;
     bgr = scenes::render(rig, {q}, seed);
   }
+  // `by_luma`: as an image without colour differences shows it, which `picture` has blurred.
   std::optional<SeamEdges> seam(const cv::Mat& picture, const std::optional<PictureProcessing>& processing,
-                                double blur_px = 0.9) const {
-    constexpr double reach_m = 0.4e-3;
-    const scenes::Sight sight(rig, picture);
-    const PoseUnknowns unknowns(scenes::pose_of(rig, 0, q), false);
-    return measure_seam(sight.scene(), sight.light(), unknowns, blur_px, reach_m, true, processing);
-  }
-  // As an image without colour differences shows it, which `picture` has blurred.
-  std::optional<SeamEdges> seam_by_luma(const cv::Mat& picture, const PictureProcessing& processing,
-                                        double blur_px) const {
+                                double blur_px = 0.9, bool by_luma = false) const {
     constexpr double reach_m = 0.4e-3;
     cv::Mat luma, grey;
     cv::cvtColor(picture, luma, cv::COLOR_BGR2GRAY);
@@ -45,7 +38,7 @@ struct GapShot {
     const scenes::Sight sight(rig, picture), grey_sight(rig, grey);
     const PoseUnknowns unknowns(scenes::pose_of(rig, 0, q), false);
     return measure_seam(sight.scene(), sight.light(), unknowns, blur_px, reach_m, true, processing,
-                        &grey_sight.light());
+                        by_luma ? &grey_sight.light() : nullptr);
   }
 };
 
@@ -85,7 +78,7 @@ TEST(SeamEdges, LieWhereTheyDoByLumaWhereColoursAreBlurred) {
     const GapShot shot(seed);
     const cv::Mat blurred = effects::seen_through(effects, shot.bgr, shot.rig.camera);
     const auto plain = shot.seam(shot.bgr, std::nullopt), raw = shot.seam(blurred, std::nullopt, seen_px),
-               luma = shot.seam_by_luma(blurred, processing, seen_px);
+               luma = shot.seam(blurred, processing, seen_px, true);
     if (!plain || !raw || !luma) continue;
     by_colours += std::pow(raw->gap_rad - plain->gap_rad, 2), by_luma += std::pow(luma->gap_rad - plain->gap_rad, 2);
     ++seen;

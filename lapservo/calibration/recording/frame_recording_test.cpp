@@ -7,30 +7,12 @@
 
 #include <gtest/gtest.h>
 
+#include "lapservo/calibration/recording/test_frames.h"
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/scenes.h"
 
 namespace lapservo::internal {
 namespace {
-
-class EvenFrames : public FrameSource {
- public:
-  EvenFrames(const cv::Size& size, int count) : size_(size), count_(count) {}
-  std::optional<Frame> next() override {
-    if (shown_ == count_) return std::nullopt;
-    Frame frame;
-    frame.bgr = cv::Mat(size_, CV_8UC3, cv::Scalar::all(10 + shown_));
-    frame.index = shown_++;
-    return frame;
-  }
-  Kind kind() const override { return Kind::folder; }
-  std::optional<int> frame_count() const override { return count_; }
-  double frames_per_second() const override { return 30; }
-
- private:
-  cv::Size size_;
-  int count_, shown_ = 0;
-};
 
 // `check` looks at frames some frames later in another thread.
 TEST(FrameRecording, FramesThatWereShownStayAsTheyAre) {

@@ -22,6 +22,7 @@
 
 namespace lapservo::internal {
 namespace transfer_test {
+using testing::expect_patches;
 
 using Encoding = std::function<double(double)>;
 
@@ -41,15 +42,11 @@ Encoding power(double gamma) {
   return [gamma](double light) { return std::pow(light, 1 / gamma); };
 }
 
-constexpr int patch_px = 64, height_px = 128;
 const std::array<cv::Vec3b, 5> patches{
     cv::Vec3b{30, 40, 200}, {60, 180, 50}, {210, 90, 40}, {128, 128, 128}, {250, 250, 250}};
 
 cv::Mat srgb_patches() {
-  cv::Mat bgr(height_px, patch_px * static_cast<int>(patches.size()), CV_8UC3);
-  for (std::size_t i = 0; i < patches.size(); ++i)
-    bgr.colRange(patch_px * static_cast<int>(i), patch_px * static_cast<int>(i + 1)).setTo(patches[i]);
-  return bgr;
+  return testing::patches_of(patches, 128);
 }
 
 // The same light, encoded in 16 bits.
@@ -61,14 +58,6 @@ cv::Mat encoded(const Encoding& encoding) {
       bgr.ptr<std::uint16_t>(v)[i] = static_cast<std::uint16_t>(
           std::lround(65535 * encoding(Response().light_from_value(srgb.ptr(v)[i] / 255.0))));
   return bgr;
-}
-
-void expect_patches(const cv::Mat& bgr, int tolerance) {
-  for (std::size_t i = 0; i < patches.size(); ++i) {
-    const cv::Vec3b seen = bgr.at<cv::Vec3b>(height_px / 2, patch_px * static_cast<int>(i) + patch_px / 2);
-    for (int channel = 0; channel < 3; ++channel)
-      EXPECT_NEAR(seen[channel], patches[i][channel], tolerance) << "patch " << i << ", " << channel;
-  }
 }
 
 bool write_video(const std::filesystem::path& path, const cv::Mat& bgr16, const std::string& arguments) {
@@ -116,7 +105,7 @@ TEST(Transfer, OfAVideoIsUndone) {
       EXPECT_EQ(source->remark(), std::string("names ") + video.name + ": its light is read as sRGB");
       const auto frame = source->next();
       ASSERT_TRUE(frame);
-      expect_patches(frame->bgr, video.encoding(0.01) == 0.01 ? 4 : 2);  // linear values of 10 bits are coarse
+      expect_patches(frame->bgr, patches, video.encoding(0.01) == 0.01 ? 4 : 2);  // linear values of 10 bits are coarse
     }
   if (written == 0) GTEST_SKIP() << "no ffmpeg";
 }
@@ -135,7 +124,7 @@ TEST(Transfer, OfCamerasIsTheRigsAndOthersAreRefused) {
     const auto source = open_frame_source(path, 25);
     EXPECT_FALSE(source->is_srgb()) << tag;
     EXPECT_EQ(source->remark(), "") << tag;
-    expect_patches(source->next()->bgr, 2);
+    expect_patches(source->next()->bgr, patches, 2);
   }
   for (const char* tag : {"log100", "log316", "smpte428"}) {
     ASSERT_TRUE(write(tag));
@@ -180,7 +169,7 @@ TEST(Transfer, OfAPngIsUndone) {
         Png{power(2.6), "gAMA", gamma_chunk(2.6), "gamma 2.60"}, Png{hlg, "cICP", {9, 18, 0, 1}, "HLG"},
         Png{pq, "cICP", {9, 16, 0, 1}, "PQ"}, Png{linear, "cICP", {1, 8, 0, 1}, "linear light"}}) {
     const auto bytes = with_chunk(encode_png(encoded(png.encoding)), png.chunk, png.content);
-    expect_patches(decode_image(bytes, "p"), 1);
+    expect_patches(decode_image(bytes, "p"), patches, 1);
     testing::write_file(folder / "a.png", {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
     const auto source = open_frame_source(folder.path().string(), 25);
     EXPECT_EQ(source->remark(), "names " + png.name + ": its light is read as sRGB");
@@ -193,7 +182,7 @@ TEST(Transfer, OfAPngThatSaysWhatCamerasDoIsTheRigs) {
   for (const auto& bytes : {with_chunk(plain, "gAMA", gamma_chunk(2.2)), with_chunk(plain, "gAMA", {0, 0, 0, 0}),
                             with_chunk(with_chunk(plain, "gAMA", gamma_chunk(1)), "sRGB", {0}),
                             with_chunk(plain, "cICP", {1, 13, 0, 1}), with_chunk(plain, "cICP", {1, 1, 0, 1})})
-    expect_patches(decode_image(bytes, "p"), 0);
+    expect_patches(decode_image(bytes, "p"), patches, 0);
 }
 
 }  // namespace transfer_test

@@ -101,14 +101,17 @@ TEST(ObservationCsv, NumbersComeBackFarFinerThanTheyAreKnown) {
     expect("l_px", o.features.l_px, 1e-4), expect("d_px", o.features.d_px, 1e-4);
     expect("cross_ratio", o.features.cross_ratio, 1e-7);
     const Rigid3& pose = o.marker->camera_from_marker;
-    expect("marker_y_m", pose.translation.y(), 1e-8), expect("marker_z_m", pose.translation.z(), 1e-8);
-    expect("marker_qx", pose.rotation.x(), 1e-8), expect("marker_qw", pose.rotation.w(), 1e-8);
+    for (int k = 0; k < 4; ++k) expect(std::string("marker_q") + "xyzw"[k], pose.rotation.coeffs()[k], 1e-8);
     expect("sigma_marker_xy_m", 1e-5, 1e-8), expect("sigma_marker_z_m", 2e-4, 1e-7);
     expect("sigma_axis_rad", 3e-4, 1e-7), expect("sigma_roll_rad", 4e-4, 1e-7);
     expect("p_false", 5e-5, 1e-8);
-    expect("tip_x_m", o.tip->camera_from_tip.translation.x(), 1e-8);
-    const double sigma_tip_m = std::sqrt(o.tip->covariance(2, 2));
-    expect("sigma_tip_z_m", sigma_tip_m, 1e-3 * sigma_tip_m);
+    for (int k = 0; k < 3; ++k) {
+      const std::string axis = std::string(1, "xyz"[k]) + "_m";
+      const double sigma_tip_m = std::sqrt(o.tip->covariance(k, k));
+      expect("marker_" + axis, pose.translation[k], 1e-8);
+      expect("tip_" + axis, o.tip->camera_from_tip.translation[k], 1e-8);
+      expect("sigma_tip_" + axis, sigma_tip_m, 1e-3 * sigma_tip_m);
+    }
   }
 }
 

@@ -94,11 +94,14 @@ TEST_P(ChromaSites, ColourEdgesAreWhereLumaHasThem) {
 TEST(Videos, LeaveColoursWhereTheyAre) {
   constexpr double by_compression_px = 0.2;
   const testing::TemporaryFolder folder;
-  internal::VideoWriter writer(folder / "a.mp4", 30);
-  for (int i = 0; i < 3; ++i) writer.add(edges());
-  writer.commit();
-  const auto source = open_frame_source((folder / "a.mp4").string(), 30);
-  for (int i = 0; i < 3; ++i) expect_edges(source->next().value().bgr, by_compression_px);
+  for (const char* name : {"a.mp4", "a.mkv", "a.ts"}) {
+    SCOPED_TRACE(name);
+    internal::VideoWriter writer(folder / name, 30);
+    for (int i = 0; i < 3; ++i) writer.add(edges());
+    writer.commit();
+    const auto source = open_frame_source((folder / name).string(), 30);
+    for (int i = 0; i < 3; ++i) expect_edges(source->next().value().bgr, by_compression_px);
+  }
 }
 
 const std::string x264 = "-c:v libx264 -crf 2 ", x265 = "-c:v libx265 -x265-params lossless=1:log-level=-1",

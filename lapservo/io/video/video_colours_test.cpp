@@ -14,8 +14,10 @@
 
 namespace lapservo {
 namespace {
+using testing::expect_patches;
+using testing::patch_px;
+using testing::patches_of;
 
-constexpr int patch_px = 64;
 const std::array<cv::Vec3b, 4> patches{cv::Vec3b{0, 0, 255}, {0, 255, 0}, {255, 0, 0}, {128, 128, 128}};
 
 struct Colours {
@@ -28,23 +30,6 @@ struct Coding {
   const char* ending;
 };
 
-// Four patches side by side.
-cv::Mat patches_of(int height_px) {
-  cv::Mat picture(height_px, 4 * patch_px, CV_8UC3);
-  for (int i = 0; i < 4; ++i)
-    picture.colRange(i * patch_px, (i + 1) * patch_px).setTo(patches[static_cast<std::size_t>(i)]);
-  return picture;
-}
-
-void expect_patches(const cv::Mat& bgr, int tolerance) {
-  for (int i = 0; i < 4; ++i) {
-    const cv::Vec3b seen = bgr.at<cv::Vec3b>(bgr.rows / 2, i * patch_px + patch_px / 2);
-    for (int channel = 0; channel < 3; ++channel)
-      EXPECT_NEAR(seen[channel], patches[static_cast<std::size_t>(i)][channel], tolerance)
-          << "patch " << i << ", " << channel;
-  }
-}
-
 class VideoColours : public ::testing::TestWithParam<std::tuple<Colours, Coding>> {};
 
 TEST_P(VideoColours, ReadAsTheirTagsSay) {
@@ -55,13 +40,13 @@ TEST_P(VideoColours, ReadAsTheirTagsSay) {
   const std::string filters =
       std::string("-vf scale=out_color_matrix=") + colours.matrix + ":out_range=" + colours.range +
       ":flags=accurate_rnd+full_chroma_int,setparams=colorspace=" + colours.tag + ":range=" + colours.range + " ";
-  if (!testing::write_by_ffmpeg(path, patches_of(patch_px), filters + coding.options + tags, 3))
+  if (!testing::write_by_ffmpeg(path, patches_of(patches, patch_px), filters + coding.options + tags, 3))
     GTEST_SKIP() << "FFmpeg here can't write " << coding.options;
   const auto source = open_frame_source(path.string(), 30);
   int frames = 0;
   while (const auto frame = source->next()) {
     ++frames;
-    expect_patches(frame->bgr, 2);
+    expect_patches(frame->bgr, patches, 2);
   }
   EXPECT_EQ(frames, 3);
 }
@@ -85,7 +70,7 @@ TEST(VideoWithoutTags, IsReadByItsHeightOrItsWriterOrAsGiven) {
     const std::string arguments = std::string("-vf scale=out_range=tv:flags=accurate_rnd:out_color_matrix=") +
                                   video.matrix + ",setparams=colorspace=unknown -pix_fmt yuv420p " +
                                   (path.ends_with("mpg") ? "-c:v mpeg2video -q:v 1 -dc 10" : "-c:v libx264 -crf 2");
-    if (!testing::write_by_ffmpeg(path, patches_of(video.height_px), arguments))
+    if (!testing::write_by_ffmpeg(path, patches_of(patches, video.height_px), arguments))
       GTEST_SKIP() << "FFmpeg here can't write " << video.name;
     SCOPED_TRACE(path + ", " + std::to_string(video.height_px) + " rows, " + video.reading.colour_matrix);
     const auto source = open_frame_source(path, 25, video.reading);
@@ -93,7 +78,7 @@ TEST(VideoWithoutTags, IsReadByItsHeightOrItsWriterOrAsGiven) {
     EXPECT_EQ(source->remark().empty(), video.remark.empty()) << source->remark();
     const auto frame = source->next();
     ASSERT_TRUE(frame);
-    expect_patches(frame->bgr, 3);
+    expect_patches(frame->bgr, patches, 3);
   }
   EXPECT_EQ(testing::input_error([&] { open_frame_source((folder / "a.mp4").string(), 25, {.colour_matrix = "709"}); }),
             "colour matrix: is 709, expected bt601, bt709 or bt2020");
@@ -110,7 +95,7 @@ TEST(VideoWithoutTags, OfARecordersCodecIsReadByItsHeight) {
                             "cfhd -quality film3+ -pix_fmt yuv422p10le", "v210", "jpeg2000 -pix_fmt yuv422p"})
     for (const auto& [matrix, height_px] : {std::pair{"bt709", 720}, {"bt709", 1088}, {"bt601", 480}}) {
       const std::string path = (folder / "a.mov").string();
-      if (!testing::write_by_ffmpeg(path, patches_of(height_px),
+      if (!testing::write_by_ffmpeg(path, patches_of(patches, height_px),
                                     std::string("-vf scale=out_range=tv:flags=accurate_rnd:out_color_matrix=") +
                                         matrix + ",setparams=colorspace=unknown -c:v " + codec))
         continue;
@@ -120,7 +105,7 @@ TEST(VideoWithoutTags, OfARecordersCodecIsReadByItsHeight) {
       EXPECT_EQ(source->remark().find("read as Rec. 709") != std::string::npos, height_px >= 720) << source->remark();
       const auto frame = source->next();
       ASSERT_TRUE(frame);
-      expect_patches(frame->bgr, 4);
+      expect_patches(frame->bgr, patches, 4);
     }
   if (written == 0) GTEST_SKIP() << "no ffmpeg";
 }

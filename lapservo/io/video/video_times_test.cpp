@@ -48,7 +48,8 @@ TEST(VideoTimes, AreWrittenAsTheyAreRead) {
   const testing::TemporaryFolder folder;
   const std::vector<double> times{0, 0.04, 0.5, 0.533, 2};
   const cv::Mat frame(48, 64, CV_8UC3, cv::Scalar(40, 90, 200));
-  for (const auto& [name, within_s] : {std::pair{"a.mp4", 1e-3}, {"a.mkv", 1e-3}, {"a.mov", 1e-3}, {"a.avi", 0.04}}) {
+  for (const auto& [name, within_s] :
+       {std::pair{"a.mp4", 1e-3}, {"a.mkv", 1e-3}, {"a.mov", 1e-3}, {"a.ts", 1e-3}, {"a.avi", 0.04}}) {
     const auto path = folder / name;
     internal::VideoWriter video(path, 25);
     for (const double time_s : times) video.add(frame, time_s);

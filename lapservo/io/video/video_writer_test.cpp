@@ -2,7 +2,6 @@
 
 #include <csignal>
 #include <filesystem>
-#include <memory>
 #include <string>
 #include <sys/resource.h>
 #include <sys/stat.h>
@@ -10,7 +9,6 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/io/frame_source.h"
-#include "lapservo/io/video/libav.h"
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
 
@@ -43,22 +41,6 @@ TEST(VideoWriter, IsWholeInEveryContainerAndReplacesThroughALink) {
   VideoWriter video(folder / "link.mp4", 29.97);
   write_noise(video, 3);
   EXPECT_TRUE(fs::is_symlink(folder / "link.mp4"));
-}
-
-// H.264 that says nothing has them on the left pixels' columns.
-TEST(VideoWriter, SaysThatChromasSamplesLieAmidFourPixels) {
-  if (!video_remark().empty()) GTEST_SKIP() << "FFmpeg here lacks libx264";
-  const TemporaryFolder folder;
-  for (const std::string extension : {".mp4", ".mkv", ".ts"}) {
-    const fs::path path = folder / ("a" + extension);
-    VideoWriter video(path, 30);
-    write_noise(video, 3);
-    AVFormatContext* opened = nullptr;
-    ASSERT_EQ(avformat_open_input(&opened, path.c_str(), nullptr, nullptr), 0);
-    const std::unique_ptr<AVFormatContext, libav::Freed<avformat_close_input>> file(opened);
-    ASSERT_GE(avformat_find_stream_info(file.get(), nullptr), 0);
-    EXPECT_EQ(file->streams[0]->codecpar->chroma_location, AVCHROMA_LOC_CENTER) << extension;
-  }
 }
 
 TEST(VideoWriter, WritesWithLosses) {
