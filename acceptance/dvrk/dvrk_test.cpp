@@ -876,7 +876,7 @@ TEST_P(Dvrk, TracksWhileEcmMovesTheCamera) {
 
   const std::size_t before = said().size();
   Eigen::Array4d worst = Eigen::Array4d::Zero();
-  move_ecm({0.15, 0.13, 0.14, 0}, 4, [&] { worst = worst.max(error().array().abs()); });
+  move_ecm({0.05, 0.03, 0.13, 0.05}, 4, [&] { worst = worst.max(error().array().abs()); });
   EXPECT_LE(worst.tail<3>().maxCoeff(), 3);
   EXPECT_EQ(said().find("hold: ", before), std::string::npos) << said();
   worst_rms_.setZero();
