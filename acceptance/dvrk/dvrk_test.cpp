@@ -128,12 +128,10 @@ class Judge {
     const Eigen::Vector4d q = here.hasNaN() ? view_q : q_from_joints(default_joints(), here.head<4>());
     return q + ArmConfig().joint_offset;
   }
-  // measured_cp of PSM1.
   std::optional<Rigid3> tip() {
     const std::lock_guard lock(mutex_);
     return tip_;
   }
-  // ECM's own measured_cp, where it is.
   std::optional<Rigid3> ecm() {
     const std::lock_guard lock(mutex_);
     return ecm_;
@@ -176,7 +174,7 @@ class Judge {
   std::vector<std::string> names_;
   std::vector<Sample> samples_;
   OperatingStateMessage state_;
-  std::optional<Rigid3> tip_, ecm_, registered_ecm_;
+  std::optional<Rigid3> tip_, ecm_, registered_ecm_;  // measured_cp of PSM1, local/measured_cp of ECM
   int faults_ = 0;
   std::vector<Transport::Subscription> subscriptions_;
 };
@@ -352,6 +350,8 @@ std::function<void(const std::string&)> text_publisher([[maybe_unused]] const st
     const std_msgs_msg_dds__String_ message{text.data()};
     dds_write(writer, &message);
   };
+#else
+  return {};
 #endif
 }
 
