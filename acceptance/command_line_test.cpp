@@ -458,9 +458,10 @@ TEST_F(CommandLine, TheTipIsKnownWhereToolAndWristAre) {
       "joints: [{name: wrist_pitch, alpha_rad: -1.5707963267949, theta_rad: -1.5707963267949}], "
       "tip_in_last_joint_m: [0.01, 0, 0]";
   const std::string plain = read_file("configs/example.yaml");
-  const std::string rig = in("tool.yaml", plain + "    tool: {" + joints +
-                                              ", wrist_in_marker_m: [0, 0, 0.03], azimuth_rad: 0.5, "
-                                              "sigma_wrist_in_marker_m: [0, 0, 1e-5]}\n");
+  const std::string tool = "    tool: {" + joints +
+                           ", wrist_in_marker_m: [0, 0, 0.03], azimuth_rad: 0.5, "
+                           "sigma_wrist_in_marker_m: [0, 0, 1e-5]}\n";
+  const std::string rig = in("tool.yaml", plain + tool);
   std::string poses = "theta_rad,phi_rad,rho_m,psi_rad\n", wrist = "time_s,roll,outer_wrist_pitch\n";
   for (int i = 0; i < 6; ++i) poses += std::to_string(-0.08 + 0.01 * i) + ",1.7,0.14," + std::to_string(0.1 * i) + "\n";
   for (int i = -1; i < 60; ++i) wrist += std::to_string(0.05 * i) + ",0," + std::to_string(0.2 + 0.01 * i) + "\n";
@@ -488,6 +489,25 @@ TEST_F(CommandLine, TheTipIsKnownWhereToolAndWristAre) {
   expect_done("track in/few --rig " + in("unplaced.yaml", plain + "    tool: {" + joints + "}\n") +
               " --out out/un.csv");
   expect_in(errors(), "lapservo calibrate tip");
+
+  // One arm's readings are no other's, unless a topic's name or the joints' says so.
+  const std::string psm2 = replaced(plain.substr(plain.find("  - name")), "[90, 180, 270]", "[90, 270, 180]");
+  const auto two_tracked = [&](const std::string& input, const std::string& tool_of_psm2) {
+    expect_done("track " + input + " --out out/two.csv --rig " +
+                in("two.yaml", plain + tool + replaced(psm2, "PSM1", "PSM2") + tool_of_psm2));
+    return CsvTable::read("out/two.csv").text(0, "tip_x_m");
+  };
+  const std::string with_table = "in/few --fps 8 --joints in/wrist.csv";
+  EXPECT_EQ(two_tracked(with_table, tool), "");
+  expect_in(errors(), "PSM1: no tip: in/wrist.csv may have the joints of PSM2, expected a topic .../PSM1/measured_js");
+  expect_in(errors(), "PSM2: no tip: in/wrist.csv may have the joints of PSM1");
+  EXPECT_NE(two_tracked(with_table, replaced(tool, "wrist_pitch", "other_pitch")), "");
+  expect_in(errors(), "PSM2: no tip: no readings of the wrist's joints other_pitch");
+#ifdef LAPSERVO_TEST_BAGS
+  write_bags_of("few", 8, CsvTable::read("in/wrist.csv"));
+  EXPECT_NE(two_tracked("in/run.bag", tool), "");
+  EXPECT_EQ(errors().rfind("lapservo: PSM2: no tip: in/run.bag: /PSM1/measured_js may have the joints of PSM1", 0), 0U);
+#endif
 }
 
 // A swinging arm whose joints are read by another clock, from the other side of its gears: from a rig that knows

@@ -45,8 +45,7 @@ void print(const CheckedRig& checked) {
 }
 
 // Medians over the frames, the largest part first.
-std::string tip_text(const Instrument& instrument, const std::vector<FrameEvidence>& frames,
-                     const std::optional<JointInput>& wrist) {
+std::string tip_text(const Instrument& instrument, const std::vector<FrameEvidence>& frames, const WristInput& wrist) {
   std::vector<double> whole_mm;
   std::array<std::pair<std::vector<double>, const char*>, 3> parts{
       {{{}, "the shaft"}, {{}, "the marker's place"}, {{}, "the wrist's joints"}}};
@@ -59,7 +58,7 @@ std::string tip_text(const Instrument& instrument, const std::vector<FrameEviden
     parts[0].first.push_back(1e3 * tip->sigma_shaft_m), parts[1].first.push_back(1e3 * tip->sigma_place_m);
     parts[2].first.push_back(1e3 * tip->sigma_readings_m);
   }
-  const std::string why = no_tip_text(instrument, wrist.has_value());
+  const std::string why = no_tip_text(instrument, wrist);
   if (whole_mm.empty()) return "unknown: " + (why.empty() ? "no frame has the marker and readings" : why);
   std::vector<std::pair<double, const char*>> sizes_mm;
   for (auto& [all_mm, from] : parts)
@@ -128,7 +127,7 @@ int check(const CalibrateOptions& options) {
   if (instrument.tool)
     checked.tip =
         tip_text(instrument, checked.frames,
-                 find_wrist_input(options.input, options.joints, options.joint_topic, instrument, source.get()));
+                 find_wrist_input(options.input, options.joints, options.joint_topic, rig, index, source.get()));
   checked.exact_registration = exact_registration_text(instrument);
   std::printf("%s\n", instrument.name.c_str());
   print(checked);

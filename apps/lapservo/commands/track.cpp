@@ -296,15 +296,16 @@ class TrackRun {
     for (std::size_t i = 0; i < instruments.size(); ++i) {
       const Instrument& instrument = instruments[i];
       if (is_new) {
-        wrists_.push_back(live_wrist_ ? std::nullopt
+        wrists_.push_back(live_wrist_ ? WristInput{std::nullopt, other_wrist_text(options_.joints, *rigs_.rig(), i)}
                                       : find_wrist_input(options_.input, options_.joints, options_.joint_topic,
-                                                         instrument, &source_));
-        if (const std::string why = no_tip_text(instrument, live_wrist_ || wrists_[i]); !why.empty())
+                                                         *rigs_.rig(), i, &source_));
+        if (const std::string why = no_tip_text(instrument, wrists_[i]); !why.empty())
           std::fprintf(stderr, "lapservo: %s: no tip: %s\n", instrument.name.c_str(), why.c_str());
       }
       if (!instrument.tool) continue;
+      const bool is_live = live_wrist_ && wrists_[i].none.empty();
       tracker.set_wrist(
-          i, live_wrist_ ? live_wrist_->newest(*instrument.tool) : wrist_at(wrists_[i], instrument, frame.time_s));
+          i, is_live ? live_wrist_->newest(*instrument.tool) : wrist_at(wrists_[i], instrument, frame.time_s));
     }
   }
 
@@ -364,7 +365,7 @@ class TrackRun {
   std::unique_ptr<OverlayWriter> overlay_;
   std::optional<LiveWrist> live_wrist_;
   std::shared_ptr<const Rig> wrists_of_;
-  std::vector<std::optional<JointInput>> wrists_;  // an instrument, by that rig
+  std::vector<WristInput> wrists_;  // an instrument, by that rig
   SteadyClock clock_;
   double begin_s_ = 0;
   Tally tally_;

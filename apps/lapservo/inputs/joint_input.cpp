@@ -64,43 +64,67 @@ std::optional<Joints> wrist_joints(const Tool& tool, const std::vector<std::stri
   return joints;
 }
 
-std::optional<JointInput> read_wrist_topic(const std::string& path, const std::string& joint_topic,
-                                           const Instrument& instrument, const FrameSource* frames) {
-  const auto bag = open_bag(path);
-  const BagTopic* topic = joint_topic_of(*bag, joint_topic, instrument.name);
-  const auto joints = topic ? wrist_joints(*instrument.tool, joint_names_in_bag(*bag, *topic)) : std::nullopt;
-  if (!joints) return std::nullopt;
-  return JointInput{*joints, joints_in_bag(*bag, *topic, *joints, frames ? frames->first_stamp_s() : std::nullopt),
-                    path};
+bool share_a_joint(const std::optional<Tool>& a, const std::optional<Tool>& b) {
+  const std::vector<std::string> of_a = wrist_names(a), of_b = wrist_names(b);
+  return std::any_of(of_a.begin(), of_a.end(), [&](const std::string& name) {
+    return std::any_of(of_b.begin(), of_b.end(), [&](const std::string& other) { return is_same_joint(name, other); });
+  });
 }
 
 }  // namespace
 
-std::optional<JointInput> find_wrist_input(const std::string& input, const std::string& joints,
-                                           const std::string& joint_topic, const Instrument& instrument,
-                                           const FrameSource* frames) {
-  if (!instrument.tool || instrument.tool->wrist.empty()) return std::nullopt;
-  const std::string& source = joints.empty() ? input : joints;
-  if (const std::string bag = bag_of(source); !bag.empty())
-    return read_wrist_topic(bag, joint_topic, instrument, frames);
-  const auto named = joints.empty() ? std::nullopt : wrist_joints(*instrument.tool, columns_of(joints));
-  if (!named) return std::nullopt;
-  return JointInput{*named, read_joint_recording(joints, *named), joints};
+WristInput find_wrist_input(const std::string& input, const std::string& joints, const std::string& joint_topic,
+                            const Rig& rig, std::size_t index, const FrameSource* frames) {
+  const Instrument& instrument = rig.instruments[index];
+  if (!instrument.tool || instrument.tool->wrist.empty()) return {};
+  const std::string path = bag_of(joints.empty() ? input : joints);
+  const auto bag = path.empty() ? nullptr : open_bag(path);
+  const BagTopic* topic = bag ? joint_topic_of(*bag, joint_topic, instrument.name) : nullptr;
+  std::vector<std::string> names;
+  if (topic) names = joint_names_in_bag(*bag, *topic);
+  if (!bag && !joints.empty()) names = columns_of(joints);
+  const auto found = wrist_joints(*instrument.tool, names);
+  if (!found)
+    return {std::nullopt, fmt::format("no readings of the wrist's joints {}: --joints names a recording or topic that "
+                                      "has them",
+                                      fmt::join(wrist_names(instrument.tool), ", "))};
+  const std::string source = topic ? path + ": " + topic->name : joints;
+  if (const std::string why = other_wrist_text(source, rig, index); !why.empty()) return {std::nullopt, why};
+  return {JointInput{*found,
+                     topic ? joints_in_bag(*bag, *topic, *found, frames ? frames->first_stamp_s() : std::nullopt)
+                           : read_joint_recording(joints, *found),
+                     source},
+          ""};
 }
 
-std::vector<double> wrist_at(const std::optional<JointInput>& wrist, const Instrument& instrument, double frame_s) {
-  const auto joints = wrist ? wrist->recording.at(frame_s - instrument.image_delay_s.value_or(0)) : std::nullopt;
+std::vector<double> wrist_at(const WristInput& wrist, const Instrument& instrument, double frame_s) {
+  const auto joints =
+      wrist.readings ? wrist.readings->recording.at(frame_s - instrument.image_delay_s.value_or(0)) : std::nullopt;
   if (!joints) return {};
   return {joints->begin(), joints->begin() + static_cast<std::ptrdiff_t>(instrument.tool->wrist.size())};
 }
 
-std::string no_tip_text(const Instrument& instrument, bool wrist_is_read) {
+std::string other_wrist_text(const std::string& source, const Rig& rig, std::size_t index) {
+  const Instrument& instrument = rig.instruments[index];
+  const auto is_of = [&](const Instrument& arm) {
+    const std::string topic = arm.name + "/measured_js";
+    return source.ends_with("/" + topic) || source.ends_with(":" + topic);
+  };
+  if (is_of(instrument) || wrist_names(instrument.tool).empty()) return "";
+  for (const Instrument& other : rig.instruments)
+    if (&other != &instrument && (is_of(other) || share_a_joint(other.tool, instrument.tool)))
+      return fmt::format(
+          "{} may have the joints of {}, expected a topic .../{}/measured_js, or wrists whose joints have different "
+          "names",
+          source, other.name, instrument.name);
+  return "";
+}
+
+std::string no_tip_text(const Instrument& instrument, const WristInput& wrist) {
   if (!instrument.tool) return "";
   if (!instrument.tool->place)
     return "the rig does not say where the tool sits behind the marker: lapservo calibrate tip measures it";
-  if (instrument.tool->wrist.empty() || wrist_is_read) return "";
-  return fmt::format("no readings of the wrist's joints {}: --joints names a recording or topic that has them",
-                     fmt::join(wrist_names(instrument.tool), ", "));
+  return wrist.none;
 }
 
 void add_joint_options(Command command, CalibrateOptions& options, const std::string& help) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
@@ -26,14 +27,21 @@ void add_joint_topic_option(Command command, std::string& joint_topic);
 std::optional<JointInput> find_joint_input(const CalibrateOptions& options, const Instrument& instrument,
                                            const FrameSource* frames);
 
-/// The readings of the joints of the tool's wrist during the frames. `joints`: of --joints, else `input`, where it is a
-/// bag. Nullopt without.
-std::optional<JointInput> find_wrist_input(const std::string& input, const std::string& joints,
-                                           const std::string& joint_topic, const Instrument& instrument,
-                                           const FrameSource* frames);
+/// The readings of the joints of a tool's wrist during the frames.
+struct WristInput {
+  std::optional<JointInput> readings;
+  std::string none;  ///< why there are none, with the remedy; empty for a tool without a wrist
+};
+
+/// For one of the rig's instruments. `joints`: of --joints, else `input`, where it is a bag.
+WristInput find_wrist_input(const std::string& input, const std::string& joints, const std::string& joint_topic,
+                            const Rig& rig, std::size_t index, const FrameSource* frames);
 /// At a frame's stamp, in the order of Tool::wrist; empty where they are not known.
-std::vector<double> wrist_at(const std::optional<JointInput>& wrist, const Instrument& instrument, double frame_s);
+std::vector<double> wrist_at(const WristInput& wrist, const Instrument& instrument, double frame_s);
+/// Why a topic's or file's readings, though they have the names of the wrist's joints, may be those of another of the
+/// rig's arms; empty where they are not, as of a topic .../INSTRUMENT/measured_js, and without a wrist.
+std::string other_wrist_text(const std::string& source, const Rig& rig, std::size_t index);
 /// Why an instrument's tip is not known, with the remedy; empty where it is, and without a tool.
-std::string no_tip_text(const Instrument& instrument, bool wrist_is_read);
+std::string no_tip_text(const Instrument& instrument, const WristInput& wrist);
 
 }  // namespace lapservo::app

@@ -62,11 +62,11 @@ int decide_on_recording(const ServoOptions& options) {
   }
   const Instrument& instrument = arm_of(options, rig);
   auto frames = open_frames(options.replay, options.recorded, &rig.camera);
-  auto wrist = find_wrist_input(options.replay, "", options.joint_topic, instrument, frames.get());
-  if (const std::string why = no_tip_text(instrument, wrist.has_value()); !why.empty())
+  auto wrist = find_wrist_input(options.replay, "", options.joint_topic, rig, 0, frames.get());
+  if (const std::string why = no_tip_text(instrument, wrist); !why.empty())
     say_remark(options.replay, "no tip: " + why);
   ReplayedRun recorded(std::move(frames), *bag, images, options.joint_topic, instrument,
-                       wrist ? std::optional(std::move(wrist->recording)) : std::nullopt);
+                       wrist.readings ? std::optional(std::move(wrist.readings->recording)) : std::nullopt);
   if (const double lead_s = recorded.arm_clock_lead_s(); std::abs(lead_s) > 0.3)
     std::printf("the arm's clock is %.2f s %s the camera's, by when both were recorded\n", std::abs(lead_s),
                 lead_s > 0 ? "ahead of" : "behind");
