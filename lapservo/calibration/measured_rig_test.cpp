@@ -44,6 +44,19 @@ TEST(MeasuredRig, HoldsAnotherRegistration) {
   expected.sigma_translation_m = {1e-5, 2e-5, 3e-5};
   expected.sigma_quaternion_xyzw.reset();  // the old one's
   EXPECT_EQ(registered(before, registration), expected);
+
+  // With the rig's own rotation.
+  Instrument known = before;
+  known.registration_covariance = Eigen::Matrix<double, 6, 6>::Identity() * 0.1 + Eigen::Matrix<double, 6, 6>::Ones();
+  registration.camera_from_rcm.rotation = known.camera_from_rcm->rotation;
+  const Instrument moved = registered(known, registration);
+  EXPECT_EQ(moved.sigma_quaternion_xyzw, known.sigma_quaternion_xyzw);
+  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
+  covariance.diagonal().head<3>() << 1e-10, 4.002e-10, 9e-10;
+  covariance.bottomRightCorner<3, 3>() = known.registration_covariance->bottomRightCorner<3, 3>();
+  EXPECT_EQ(moved.registration_covariance, covariance);
+  registration.camera_from_rcm.rotation = expected.camera_from_rcm->rotation;
+
   registration.sigma_quaternion = Eigen::Vector4d(1e-4, 2e-4, 3e-4, 4e-4);
   registration.arm = Registration::Arm{{{"yaw", "pitch", "insertion", "roll"}, {1, -1, 1, 1}, {0, 1.0 / 7, 0.02, -3}},
                                        {0, 1e-3, 2e-3, 3e-3},

@@ -100,12 +100,18 @@ MeasuredPoses poses_in_table(const std::filesystem::path& path, const std::strin
 }
 
 Instrument registered(Instrument instrument, const Registration& registration) {
+  const bool keeps_rotation = instrument.camera_from_rcm && instrument.camera_from_rcm->rotation.coeffs() ==
+                                                                registration.camera_from_rcm.rotation.coeffs();
   instrument.camera_from_rcm = registration.camera_from_rcm;
   instrument.sigma_translation_m = rounded_sigmas<3>(registration.sigma_translation_m);
-  instrument.sigma_quaternion_xyzw.reset();
+  if (!keeps_rotation) instrument.sigma_quaternion_xyzw.reset(), instrument.registration_covariance.reset();
+  if (auto& covariance = instrument.registration_covariance) {
+    const Eigen::Matrix3d of_translation = registration.sigma_translation_m.cwiseAbs2().asDiagonal();
+    covariance->topLeftCorner<3, 3>() = rounded_covariance(of_translation);
+    covariance->topRightCorner<3, 3>().setZero(), covariance->bottomLeftCorner<3, 3>().setZero();
+  }
   if (registration.sigma_quaternion)
     instrument.sigma_quaternion_xyzw = rounded_sigmas<4>(*registration.sigma_quaternion);
-  instrument.registration_covariance.reset();
   if (!registration.arm) return instrument;
   instrument.registration_covariance = rounded_covariance(
       in_camera_axes(registration.camera_from_rcm, registration.arm->covariance.topLeftCorner<6, 6>()));

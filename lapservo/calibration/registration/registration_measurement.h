@@ -30,7 +30,7 @@ MeasuredPoses poses_in_frames(const Rig& rig, std::size_t instrument, const Fram
 /// of another kind, for numbers that are none and for times that fall.
 MeasuredPoses poses_in_table(const std::filesystem::path& path, const std::string& instrument);
 
-/// The instrument with what was measured; what was not stays.
+/// The instrument with what was measured; what was not stays, the uncertainty of a rotation that stays included.
 Instrument registered(Instrument instrument, const Registration& registration);
 
 /// Results in mm, mrad and ms; `before` is NaN where the rig had no value. `before` has the joints that the
