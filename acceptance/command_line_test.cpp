@@ -452,7 +452,8 @@ TEST_F(CommandLine, HelpShowsExamples) {
   EXPECT_EQ(run("fly"), 2);
 }
 
-// By a tool in the rig, its wrist's readings beside the frames: columns, overlay, and how well it is known.
+// By a tool in the rig, its wrist's readings beside the frames, bent by more than an arm's joint goes in metres:
+// columns, overlay, and how well it is known.
 TEST_F(CommandLine, TheTipIsKnownWhereToolAndWristAre) {
   const std::string joints =
       "joints: [{name: wrist_pitch, alpha_rad: -1.5707963267949, theta_rad: -1.5707963267949}], "
@@ -464,7 +465,7 @@ TEST_F(CommandLine, TheTipIsKnownWhereToolAndWristAre) {
   const std::string rig = in("tool.yaml", plain + tool);
   std::string poses = "theta_rad,phi_rad,rho_m,psi_rad\n", wrist = "time_s,roll,outer_wrist_pitch\n";
   for (int i = 0; i < 6; ++i) poses += std::to_string(-0.08 + 0.01 * i) + ",1.7,0.14," + std::to_string(0.1 * i) + "\n";
-  for (int i = -1; i < 60; ++i) wrist += std::to_string(0.05 * i) + ",0," + std::to_string(0.2 + 0.01 * i) + "\n";
+  for (int i = -1; i < 60; ++i) wrist += std::to_string(0.05 * i) + ",0," + std::to_string(2.2 + 0.01 * i) + "\n";
   expect_done("render --rig configs/example.yaml --out in/few --poses " + in("poses.csv", poses));
   expect_done("track in/few --fps 8 --rig " + rig + " --out out/seen.csv --overlay out/overlay --joints " +
               in("wrist.csv", wrist));
@@ -476,7 +477,7 @@ TEST_F(CommandLine, TheTipIsKnownWhereToolAndWristAre) {
       const std::string axis = std::string(1, "xyz"[i]) + "_m";
       marker_to_tip_m[i] = seen.number(row, "tip_" + axis) - seen.number(row, "marker_" + axis);
     }
-    const double wrist_rad = 0.2 + 0.01 * static_cast<double>(row) / 8 / 0.05;
+    const double wrist_rad = 2.2 + 0.01 * static_cast<double>(row) / 8 / 0.05;
     EXPECT_NEAR(marker_to_tip_m.norm(), std::hypot(0.03 + 0.01 * std::cos(wrist_rad), 0.01 * std::sin(wrist_rad)),
                 1e-7);
     EXPECT_GT(seen.number(row, "sigma_tip_z_m"), 0);

@@ -73,8 +73,8 @@ std::vector<std::string> joint_names_in_bag(const Bag& bag, const BagTopic& topi
   return {};
 }
 
-JointRecording joints_in_bag(const Bag& bag, const BagTopic& topic, const Joints& joints,
-                             std::optional<double> begin_s) {
+JointRecording joints_in_bag(const Bag& bag, const BagTopic& topic, const Joints& joints, std::optional<double> begin_s,
+                             JointsOf whose) {
   const std::string source = bag.path() + ": " + topic.name;
   JointRecording recording;
   std::vector<std::string> other_names;  // of the latest message of another arm
@@ -107,7 +107,7 @@ JointRecording joints_in_bag(const Bag& bag, const BagTopic& topic, const Joints
     throw InputError(source, fmt::format("has {} readings that are numbers with a stamp, expected two or more",
                                          recording.time_s.size()));
   if (begin_s) check_clock(recording, *begin_s, source);
-  check_units(recording, joints, source);
+  check_units(recording, joints, source, whose);
   return recording;
 }
 

@@ -90,9 +90,10 @@ WristInput find_wrist_input(const std::string& input, const std::string& joints,
                                       fmt::join(wrist_names(instrument.tool), ", "))};
   const std::string source = topic ? path + ": " + topic->name : joints;
   if (const std::string why = other_wrist_text(source, rig, index); !why.empty()) return {std::nullopt, why};
+  const auto begin_s = frames ? frames->first_stamp_s() : std::nullopt;
   return {JointInput{*found,
-                     topic ? joints_in_bag(*bag, *topic, *found, frames ? frames->first_stamp_s() : std::nullopt)
-                           : read_joint_recording(joints, *found),
+                     topic ? joints_in_bag(*bag, *topic, *found, begin_s, JointsOf::wrist)
+                           : read_joint_recording(joints, *found, JointsOf::wrist),
                      source},
           ""};
 }

@@ -59,11 +59,12 @@ std::string JointRecording::remark() const {
                      text.empty() ? "" : "; ", steps);
 }
 
-JointRecording read_joint_recording(const std::filesystem::path& path, const Joints& joints) {
-  return joint_recording_of(CsvTable::read(path), path.string(), joints);
+JointRecording read_joint_recording(const std::filesystem::path& path, const Joints& joints, JointsOf whose) {
+  return joint_recording_of(CsvTable::read(path), path.string(), joints, whose);
 }
 
-JointRecording joint_recording_of(const CsvTable& table, const std::string& source, const Joints& joints) {
+JointRecording joint_recording_of(const CsvTable& table, const std::string& source, const Joints& joints,
+                                  JointsOf whose) {
   JointRecording recording;
   for (std::size_t row = 0; row < table.rows(); ++row) {
     const double time_s = table.number(row, "time_s");
@@ -79,17 +80,17 @@ JointRecording joint_recording_of(const CsvTable& table, const std::string& sour
     recording.time_s.push_back(time_s), recording.joints.push_back(at);
   }
   if (recording.time_s.size() < 2) throw InputError(source, "has fewer than two rows");
-  check_units(recording, joints, source);
+  check_units(recording, joints, source, whose);
   return recording;
 }
 
-void check_units(const JointRecording& recording, const Joints& joints, const std::string& source) {
-  constexpr double turn_rad = 2 * std::numbers::pi;
-  constexpr std::array<double, 4> largest{2 * turn_rad, 2 * turn_rad, 2, 16 * turn_rad};  // rad rad m rad
+void check_units(const JointRecording& recording, const Joints& joints, const std::string& source, JointsOf whose) {
+  constexpr double turn_rad = 2 * std::numbers::pi, largest_m = 2;
+  constexpr std::array<double, 4> largest_rad{2 * turn_rad, 2 * turn_rad, 16 * turn_rad, 16 * turn_rad};
   for (std::size_t i = 0; i < joints.names.size(); ++i) {
-    const bool is_length = i == 2;
+    const bool is_length = whose == JointsOf::arm && i == 2;
     for (const auto& at : recording.joints)
-      if (std::abs(at[i]) > largest[i])
+      if (std::abs(at[i]) > (is_length ? largest_m : largest_rad[i]))
         throw InputError(source, joints.names[i], fmt::format("{:.6g}", at[i]),
                          is_length ? "metres: it looks like millimetres" : "radians: it looks like degrees");
   }

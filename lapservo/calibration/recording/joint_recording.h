@@ -11,10 +11,13 @@
 
 namespace lapservo::internal {
 
-/// An arm's joints over time.
+/// Whose the four joints of a recording are: an arm's (rad, rad, m, rad) or a wrist's, all in rad.
+enum class JointsOf { arm, wrist };
+
+/// Joints over time.
 struct JointRecording {
   std::vector<double> time_s;                 ///< rises
-  std::vector<std::array<double, 4>> joints;  ///< as Joints::names has them; rad, rad, m, rad
+  std::vector<std::array<double, 4>> joints;  ///< as Joints::names has them
   int repeated = 0;                           ///< readings passed over: the one before has the same stamp
   int of_other_arms = 0;                      ///< messages passed over: they lack a joint of the rig
   int left_out = 0;                           ///< messages passed over: their stamps are none, late or stand out
@@ -30,14 +33,16 @@ struct JointRecording {
 /// A CSV of `time_s` and a column a joint (docs/calibration.md). Throws InputError for columns that are missing,
 /// numbers that are none, fewer than two rows and times that do not rise. A row that repeats the one before is passed
 /// over.
-JointRecording read_joint_recording(const std::filesystem::path& path, const Joints& joints);
+JointRecording read_joint_recording(const std::filesystem::path& path, const Joints& joints,
+                                    JointsOf whose = JointsOf::arm);
 
 /// The same of a table that was read already; `source` is named in complaints.
-JointRecording joint_recording_of(const CsvTable& table, const std::string& source, const Joints& joints);
+JointRecording joint_recording_of(const CsvTable& table, const std::string& source, const Joints& joints,
+                                  JointsOf whose = JointsOf::arm);
 
 /// Throws InputError naming `source` and the joint where numbers are too large for radians and metres, as degrees and
 /// millimetres are.
-void check_units(const JointRecording& recording, const Joints& joints, const std::string& source);
+void check_units(const JointRecording& recording, const Joints& joints, const std::string& source, JointsOf whose);
 
 /// The instrument's joints; where it has none, the recording's own four in the order theta, phi, rho, psi. Throws
 /// InputError naming `source` when there are not four, and the rig that would name them.
