@@ -466,10 +466,11 @@ TEST_F(CommandLine, TheTipIsKnownWhereToolAndWristAre) {
   std::string poses = "theta_rad,phi_rad,rho_m,psi_rad\n", wrist = "time_s,roll,outer_wrist_pitch\n";
   for (int i = 0; i < 6; ++i) poses += std::to_string(-0.08 + 0.01 * i) + ",1.7,0.14," + std::to_string(0.1 * i) + "\n";
   for (int i = -1; i < 60; ++i) wrist += std::to_string(0.05 * i) + ",0," + std::to_string(2.2 + 0.01 * i) + "\n";
+  wrist += wrist.substr(wrist.rfind('\n', wrist.size() - 2) + 1);
   expect_done("render --rig configs/example.yaml --out in/few --poses " + in("poses.csv", poses));
   expect_done("track in/few --fps 8 --rig " + rig + " --out out/seen.csv --overlay out/overlay --joints " +
               in("wrist.csv", wrist));
-  EXPECT_EQ(errors(), "");
+  EXPECT_EQ(errors(), "lapservo: in/wrist.csv: passed over: 1 repeated readings\n");
   const CsvTable seen = CsvTable::read("out/seen.csv");
   for (std::size_t row = 0; row < seen.rows(); ++row) {
     Eigen::Vector3d marker_to_tip_m;
@@ -490,6 +491,8 @@ TEST_F(CommandLine, TheTipIsKnownWhereToolAndWristAre) {
   expect_done("track in/few --rig " + in("unplaced.yaml", plain + "    tool: {" + joints + "}\n") +
               " --out out/un.csv");
   expect_in(errors(), "lapservo calibrate tip");
+  ToolTest::expect_refused("track in/few --rig configs/example.yaml --out out/no.csv --joints in/none.csv",
+                           {"--joints: is in/none.csv, expected a tool with a wrist in configs/example.yaml"});
 
   // One arm's readings are no other's, unless a topic's name or the joints' says so.
   const std::string psm2 = replaced(plain.substr(plain.find("  - name")), "[90, 180, 270]", "[90, 270, 180]");
@@ -507,7 +510,10 @@ TEST_F(CommandLine, TheTipIsKnownWhereToolAndWristAre) {
 #ifdef LAPSERVO_TEST_BAGS
   write_bags_of("few", 8, CsvTable::read("in/wrist.csv"));
   EXPECT_NE(two_tracked("in/run.bag", tool), "");
-  EXPECT_EQ(errors().rfind("lapservo: PSM2: no tip: in/run.bag: /PSM1/measured_js may have the joints of PSM1", 0), 0U);
+  EXPECT_EQ(errors().rfind("lapservo: in/run.bag: /PSM1/measured_js: passed over: 1 repeated readings\n"
+                           "lapservo: PSM2: no tip: in/run.bag: /PSM1/measured_js may have the joints of PSM1",
+                           0),
+            0U);
 #endif
 }
 

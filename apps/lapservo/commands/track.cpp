@@ -72,6 +72,15 @@ void refuse_outputs(const TrackOptions& options, const InputFiles& inputs) {
     throw InputError(options.out, "is the place for --out and --overlay, expected two places");
 }
 
+void expect_wrist(const TrackOptions& options, const fs::path& path, const Rig& rig) {
+  const bool has_wrist = std::any_of(rig.instruments.begin(), rig.instruments.end(), [](const Instrument& instrument) {
+    return instrument.tool && !instrument.tool->wrist.empty();
+  });
+  if (!options.joints.empty() && !has_wrist)
+    throw InputError("--joints", fmt::format("is {}, expected a tool with a wrist in {}, whose joints it would have",
+                                             options.joints, path.string()));
+}
+
 // Which rig a frame is to be tracked with: the one named by --rig, else NAME.rig.yaml beside the image, else rig.yaml
 // in its folder. The tracker begins anew when the rig changes.
 class RigByFrame {
@@ -122,6 +131,7 @@ class RigByFrame {
   static fs::path sidecar(const fs::path& file) { return fs::path(file).replace_extension(".rig.yaml"); }
   void use(const fs::path& path) {
     rig_ = std::make_shared<const Rig>(load_rig(path));
+    expect_wrist(options_, path, *rig_);
     InputFiles inputs;
     inputs.add_rig(path, *rig_);
     refuse_outputs(options_, inputs);

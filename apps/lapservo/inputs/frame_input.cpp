@@ -1,6 +1,7 @@
 #include "apps/lapservo/inputs/frame_input.h"
 
 #include <cstdio>
+#include <set>
 #include <utility>
 
 #include "apps/lapservo/cli/interrupt.h"
@@ -16,7 +17,9 @@ namespace lapservo::app {
 using namespace internal;
 
 void say_remark(const std::string& input, const std::string& remark) {
-  if (!remark.empty()) std::fprintf(stderr, "lapservo: %s: %s\n", input.c_str(), remark.c_str());
+  static std::set<std::pair<std::string, std::string>> said;  // instruments, the arm and its wrist share recordings
+  if (!remark.empty() && said.emplace(input, remark).second)
+    std::fprintf(stderr, "lapservo: %s: %s\n", input.c_str(), remark.c_str());
 }
 
 namespace {

@@ -24,7 +24,7 @@ struct FrameOptions {
 /// the rig's, whose size a camera's images shall have; null where none is known.
 std::unique_ptr<FrameSource> open_frames(const std::string& input, const FrameOptions& options, const Camera* camera);
 
-/// Says it on stderr, where there is something to say.
+/// Says it on stderr, once, where there is something to say.
 void say_remark(const std::string& input, const std::string& remark);
 
 /// Says on stderr when a topic's name (image_rect, image_rect_color) is that of undistorted images, which do not go

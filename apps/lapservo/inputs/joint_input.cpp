@@ -45,9 +45,9 @@ JointInput read_table(const CalibrateOptions& options, const Instrument& instrum
 JointInput read_topic(const CalibrateOptions& options, const Instrument& instrument, const FrameSource* frames,
                       const Bag& bag, const BagTopic& topic) {
   const auto begin_s = frames ? frames->first_stamp_s() : std::nullopt;
-  const Joints joints =
-      joints_of(instrument, joint_names_in_bag(bag, topic), bag.path() + ": " + topic.name, options.rig);
-  return reported({joints, joints_in_bag(bag, topic, joints, begin_s), bag.path()});
+  const std::string source = bag.path() + ": " + topic.name;
+  const Joints joints = joints_of(instrument, joint_names_in_bag(bag, topic), source, options.rig);
+  return reported({joints, joints_in_bag(bag, topic, joints, begin_s), source});
 }
 
 // A wrist's joints by the names that they are recorded with, repeated up to four.
@@ -79,6 +79,7 @@ WristInput find_wrist_input(const std::string& input, const std::string& joints,
   if (!instrument.tool || instrument.tool->wrist.empty()) return {};
   const std::string path = bag_of(joints.empty() ? input : joints);
   const auto bag = path.empty() ? nullptr : open_bag(path);
+  if (bag && path != input) say_remark(path, bag->remark());
   const BagTopic* topic = bag ? joint_topic_of(*bag, joint_topic, instrument.name) : nullptr;
   std::vector<std::string> names;
   if (topic) names = joint_names_in_bag(*bag, *topic);
@@ -91,10 +92,10 @@ WristInput find_wrist_input(const std::string& input, const std::string& joints,
   const std::string source = topic ? path + ": " + topic->name : joints;
   if (const std::string why = other_wrist_text(source, rig, index); !why.empty()) return {std::nullopt, why};
   const auto begin_s = frames ? frames->first_stamp_s() : std::nullopt;
-  return {JointInput{*found,
-                     topic ? joints_in_bag(*bag, *topic, *found, begin_s, JointsOf::wrist)
-                           : read_joint_recording(joints, *found, JointsOf::wrist),
-                     source},
+  return {reported({*found,
+                    topic ? joints_in_bag(*bag, *topic, *found, begin_s, JointsOf::wrist)
+                          : read_joint_recording(joints, *found, JointsOf::wrist),
+                    source}),
           ""};
 }
 
