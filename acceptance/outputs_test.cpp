@@ -134,7 +134,10 @@ TEST_F(Outputs, NeverGoOverInputs) {
                                 "render --rig rig.yaml --background frames/0000.png --out frames --force",
                                 "experiment rcm --rig rig.yaml --out . --force"})
     expect_refused(arguments, {"input"});
-  expect_refused("track frames --out same --overlay same", {"two places"});
+  for (const char* arguments :
+       {"track frames --out same --overlay ./same", "align frames --rig rig.yaml --out same --report ./same",
+        "calibrate registration frames --rig rig.yaml --out same --base-frame same"})
+    expect_refused(arguments, {"two results"});
   EXPECT_EQ(snapshot(), before);
 }
 

@@ -66,10 +66,7 @@ void refuse_outputs(const TrackOptions& options, const InputFiles& inputs) {
   inputs.refuse_as_output(options.out);
   inputs.refuse_as_output(options.overlay);
   inputs.refuse_in_folder(options.overlay);
-  std::error_code error;
-  if (!options.overlay.empty() &&
-      fs::weakly_canonical(options.out, error) == fs::weakly_canonical(options.overlay, error))
-    throw InputError(options.out, "is the place for --out and --overlay, expected two places");
+  refuse_shared_place({options.out, options.overlay});
 }
 
 void expect_wrist(const TrackOptions& options, const fs::path& path, const Rig& rig) {

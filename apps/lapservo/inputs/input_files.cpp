@@ -1,6 +1,7 @@
 #include "apps/lapservo/inputs/input_files.h"
 
 #include <optional>
+#include <set>
 #include <string>
 #include <sys/stat.h>
 #include <system_error>
@@ -20,6 +21,14 @@ std::optional<std::pair<unsigned long long, unsigned long long>> identity_of(con
 }
 
 }  // namespace
+
+void refuse_shared_place(const std::vector<fs::path>& places) {
+  std::set<fs::path> taken;
+  std::error_code error;
+  for (const fs::path& place : places)
+    if (!place.empty() && !taken.insert(fs::weakly_canonical(fs::absolute(place, error), error)).second)
+      throw InputError(place.string(), "is the place for two results, expected a place for each");
+}
 
 void InputFiles::add(const fs::path& path) {
   if (const auto identity = identity_of(path)) files_.emplace(*identity, path);

@@ -3,10 +3,14 @@
 #include <filesystem>
 #include <map>
 #include <utility>
+#include <vector>
 
 #include "lapservo/rig/rig.h"
 
 namespace lapservo::app {
+
+/// Throws InputError when two results would have one place; an empty one is none.
+void refuse_shared_place(const std::vector<std::filesystem::path>& places);
 
 /// The regular files that a command reads, so that none of them is written over, by whatever name or link.
 class InputFiles {

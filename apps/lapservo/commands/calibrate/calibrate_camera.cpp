@@ -35,15 +35,8 @@ void check_files(const CalibrateCameraOptions& options, const std::optional<Rig>
     files.add(input);
     if (fs::is_directory(input, error)) files.add_pictures_in(input);
   }
-  std::vector<fs::path> places;
-  for (const std::string& place : {options.rig_out(), options.camera_info}) {
-    if (place.empty()) continue;
-    files.refuse_as_output(place);
-    const fs::path canonical = fs::weakly_canonical(place, error);
-    if (std::find(places.begin(), places.end(), canonical) != places.end())
-      throw InputError(place, "is the place for two results, expected a place for each");
-    places.push_back(canonical);
-  }
+  for (const std::string& place : {options.rig_out(), options.camera_info}) files.refuse_as_output(place);
+  refuse_shared_place({options.rig_out(), options.camera_info});
   if (!rig) return;
   files.add_rig(options.rig, *rig);
   files.refuse_as_output(options.camera_info);

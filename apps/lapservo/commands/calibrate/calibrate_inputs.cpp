@@ -69,6 +69,7 @@ void refuse_outputs_over_inputs(const CalibrateOptions& options, const Rig& rig)
   for (const std::string& input : {options.input, options.joints})
     if (fs::is_directory(input, error)) inputs.add_pictures_in(input);
   for (const std::string& out : {options.out, options.report, options.dvrk.base_frame}) inputs.refuse_as_output(out);
+  refuse_shared_place({options.out, options.report, options.dvrk.base_frame});
   inputs.add_rig(options.rig, rig);
   inputs.refuse_as_output(options.report);
   inputs.refuse_as_output(options.dvrk.base_frame);
