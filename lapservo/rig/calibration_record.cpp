@@ -13,6 +13,7 @@
 #include "lapservo/core/atomic_file.h"
 #include "lapservo/core/known_keys.h"
 #include "lapservo/core/yaml_field.h"
+#include "lapservo/rig/rig.h"
 
 namespace lapservo::internal {
 namespace {
@@ -92,6 +93,18 @@ std::string content_state(const fs::path& path) {
     for (std::streamsize i = 0; i < file.gcount(); ++i)
       hash = (hash ^ static_cast<unsigned char>(bytes[static_cast<std::size_t>(i)])) * 1099511628211U;
   return fmt::format("fnv1a-{:016x}", hash);
+}
+
+std::string rig_state(const fs::path& path) {
+  const Rig rig = load_rig(path);
+  std::string state = content_state(path);
+  const auto add = [&](const fs::path& file) {
+    if (!file.empty()) state.append(" ").append(content_state(file));
+  };
+  add(rig.camera_file);
+  for (const Instrument& instrument : rig.instruments)
+    if (instrument.tool) add(instrument.tool->file);
+  return state;
 }
 
 std::string input_state(const fs::path& path) {

@@ -23,7 +23,7 @@ struct CalibrationStep {
 /// The calibrations of a rig in their order, and the rig's content after the last of them: RIG.calibration.yaml beside
 /// the rig.
 struct CalibrationRecord {
-  std::string rig;  ///< content_state() of the rig file; empty when nothing was done
+  std::string rig;  ///< rig_state(); empty when nothing was done
   std::vector<CalibrationStep> steps;
 
   /// Nullptr when it was not done.
@@ -43,6 +43,9 @@ void write_record(const std::filesystem::path& path, const CalibrationRecord& re
 
 /// A fingerprint of a file's bytes (FNV-1a), to find out whether it has changed. Empty when it can't be read.
 std::string content_state(const std::filesystem::path& path);
+
+/// The same of a rig's file, and of the camera's and tools' files that it names. Throws as load_rig().
+std::string rig_state(const std::filesystem::path& rig);
 
 /// The same for recordings, which are large, by size and time of change: of a file, or of a folder's files together.
 /// Empty for what is no file: a camera, a stream.

@@ -7,6 +7,7 @@
 
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
+#include "lapservo/tool/test_tools.h"
 
 namespace lapservo::internal {
 namespace {
@@ -62,6 +63,25 @@ TEST(CalibrationRecord, StatesTellWhetherFilesAreTheSame) {
   EXPECT_NE(input_state(folder.path()), both);
   EXPECT_EQ(input_state("/dev/null"), "");
   EXPECT_EQ(content_state(folder / "nothing"), "");
+}
+
+TEST(CalibrationRecord, ARigIsAnotherOnceAFileThatItNamesIs) {
+  const lapservo::testing::TemporaryFolder folder;
+  const auto rig = folder / "rig.yaml";
+  const std::string camera =
+      "image_width: 640\nimage_height: 480\ncamera_matrix: {data: [500, 0, 319.5, 0, 500, 239.5, 0, 0, 1]}\n";
+  write_file(folder / "camera.yaml", camera);
+  write_file(folder / "tool.json", invented_tool_json);
+  write_file(rig,
+             "camera: camera.yaml\ninstruments: [{name: A, marker: {diameter_m: 0.0084, bands_upper_m: [0.0035, "
+             "0.0035, 0.017], bands_lower_m: [0.0095, 0.0095, 0.005]}, tool: tool.json}]\n");
+  const std::string before = rig_state(rig), content = content_state(rig);
+  write_file(folder / "camera.yaml", camera + "\n");
+  const std::string another_camera = rig_state(rig);
+  write_file(folder / "tool.json", std::string(invented_tool_json) + "\n");
+  EXPECT_NE(another_camera, before);
+  EXPECT_NE(rig_state(rig), another_camera);
+  EXPECT_EQ(content_state(rig), content);
 }
 
 }  // namespace

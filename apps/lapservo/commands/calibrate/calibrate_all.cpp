@@ -90,8 +90,9 @@ class Guide {
  public:
   explicit Guide(AllOptions& options)
       : options_(options), record_file_(record_path(options.rig)), record_(read_record(record_file_)) {
-    if (record_.steps.empty() || record_.rig == content_state(options.rig)) return;
-    std::printf("%s is not as the last step left it: all steps are done anew\n", options.rig.c_str());
+    if (record_.steps.empty() || record_.rig == rig_state(options.rig)) return;
+    std::printf("%s is not as the last step left it, or a file that it names: all steps are done anew\n",
+                options.rig.c_str());
     record_.steps.clear();
   }
 
@@ -208,7 +209,7 @@ class Guide {
     std::fflush(stdout);
     const int code = step.run(options_of(step));
     if (code == 0) {
-      record_.add(now), record_.rig = content_state(options_.rig);
+      record_.add(now), record_.rig = rig_state(options_.rig);
       write_record(record_file_, record_);
     }
     if (code == 0 && !interrupted()) return 0;
