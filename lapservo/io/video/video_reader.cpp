@@ -12,6 +12,7 @@
 
 extern "C" {
 #include <libavutil/display.h>
+#include <libavutil/opt.h>
 #include <libavutil/pixdesc.h>
 }
 
@@ -28,8 +29,6 @@ extern "C" {
 namespace lapservo::internal {
 namespace {
 using Clock = std::chrono::steady_clock;
-
-constexpr std::int64_t transport_packet_bytes = 188;
 
 int past(void* deadline) {
   return Clock::now() > *static_cast<Clock::time_point*>(deadline) ? 1 : 0;
@@ -120,13 +119,21 @@ class VideoReader::State {
     const double frames_s = 2 / frames_per_second(), read_s = std::max(end_s_, end_of_all_s_);
     if (const auto announced_s = duration_s(); announced_s && read_s < (1 - slack) * *announced_s - frames_s)
       return fmt::format("ends early, after {:.2f} of {:.2f} s", end_s_, *announced_s);
-    const bool transport = std::string_view(format_->iformat->name) == "mpegts";
-    if (transport && format_->pb && avio_size(format_->pb) % transport_packet_bytes != 0) return "ends within a frame";
+    if (format_->pb && avio_size(format_->pb) % transport_packet_bytes() != 0) return "ends within a frame";
     return damaged_ > 0 ? "is damaged in " + std::to_string(damaged_) + " of " + std::to_string(frames_) + " frames"
                         : "";
   }
 
  private:
+  // By the distance of their sync bytes, as FFmpeg found it: 188, 192 in a camcorder's .mts, 204 with error correction.
+  // 1 for other containers.
+  std::int64_t transport_packet_bytes() const {
+    std::int64_t bytes = 1;
+    if (std::string_view(format_->iformat->name) == "mpegts")
+      av_opt_get_int(format_->priv_data, "ts_packetsize", 0, &bytes);
+    return std::max<std::int64_t>(1, bytes);
+  }
+
   void open() {
     deadline_ = Clock::now() + patience_;
     AVFormatContext* format = avformat_alloc_context();

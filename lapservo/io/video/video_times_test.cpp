@@ -79,6 +79,7 @@ TEST(VideoTimes, EndWithTheVideoWhateverLastsLonger) {
                                         {"a.mov", video + sound},
                                         {"a.avi", video + sound},
                                         {"a.ts", video + sound},
+                                        {"a.m2ts", video + sound},
                                         {"b.mkv", video + subtitles},
                                         {"b.mp4", video + subtitles + "-c:s mov_text "},
                                         {"c.mkv", late_video + sound},
@@ -90,9 +91,15 @@ TEST(VideoTimes, EndWithTheVideoWhateverLastsLonger) {
     EXPECT_EQ(times.complaint, "") << name;
   }
   if (written == 0) GTEST_SKIP() << "no ffmpeg";
-  for (const char* name : {"a.mkv", "a.webm", "a.flv"}) {
+  std::string with_correction;
+  const std::string packets = testing::read_file(folder / "a.ts");
+  for (std::size_t at = 0; at < packets.size(); at += 188)
+    with_correction += packets.substr(at, 188) + std::string(16, '\0');
+  testing::write_file(folder / "fec.ts", with_correction);
+  EXPECT_EQ(read_times(folder / "fec.ts").complaint, "");
+  for (const char* name : {"a.mkv", "a.webm", "a.flv", "a.ts", "a.m2ts", "fec.ts"}) {
     const std::string whole = testing::read_file(folder / name);
-    testing::write_file(folder / name, whole.substr(0, whole.size() * 4 / 5));
+    testing::write_file(folder / name, whole.substr(0, whole.size() * 4 / 5 + 1));  // within a packet, too
     EXPECT_NE(read_times(folder / name).complaint, "") << name << " that is cut";
   }
 }
