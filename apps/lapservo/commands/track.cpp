@@ -278,7 +278,7 @@ class TrackRun {
       const double came_s = clock_.now_s() - (live_ ? live_->age_s() : 0);
       Tracker& tracker = rigs_.tracker_for(*frame);
       try {
-        set_wrists(tracker, *frame);
+        set_wrists(tracker, *frame, came_s);
         const auto& observations =
             frame->flaw ? tracker.refuse(*frame->flaw) : tracker.track(frame->bgr, frame->time_s);
         tally_.add(observations);
@@ -295,8 +295,8 @@ class TrackRun {
     }
   }
 
-  // Readings of the wrists at the frame's time. Once a rig, the reason why an instrument has no tip.
-  void set_wrists(Tracker& tracker, const Frame& frame) {
+  // Readings of the wrists at the frame's exposure. Once a rig, the reason why an instrument has no tip.
+  void set_wrists(Tracker& tracker, const Frame& frame, double came_s) {
     const std::vector<Instrument>& instruments = rigs_.rig()->instruments;
     const bool is_new = std::exchange(wrists_of_, rigs_.rig()) != rigs_.rig();
     if (is_new) wrists_.clear();
@@ -312,7 +312,7 @@ class TrackRun {
       if (!instrument.tool) continue;
       const bool is_live = live_wrist_ && wrists_[i].none.empty();
       tracker.set_wrist(
-          i, is_live ? live_wrist_->newest(*instrument.tool) : wrist_at(wrists_[i], instrument, frame.time_s));
+          i, is_live ? live_wrist_->at_exposure(instrument, came_s) : wrist_at(wrists_[i], instrument, frame.time_s));
     }
   }
 

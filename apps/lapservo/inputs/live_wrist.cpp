@@ -1,10 +1,8 @@
 #include "apps/lapservo/inputs/live_wrist.h"
 
-#include <cmath>
 #include <utility>
 
 #include "apps/lapservo/inputs/transports.h"
-#include "lapservo/crtk/joint_map.h"
 #include "lapservo/tool/wrist.h"
 
 namespace lapservo::app {
@@ -15,20 +13,17 @@ LiveWrist::LiveWrist(const std::string& topic) {
   transport_ = make_transport(address.transport, "lapservo_wrist", "--joints");
   subscription_ = transport_->subscribe_joints(address.name, [this](JointMessage&& message) {
     const std::lock_guard lock(mutex_);
-    latest_ = std::move(message), came_s_ = clock_.now_s();
+    history_.add(std::move(message), clock_.now_s());
   });
 }
 
-std::vector<double> LiveWrist::newest(const Tool& tool) const {
-  constexpr double too_old_s = 0.5;
+std::vector<double> LiveWrist::at_exposure(const Instrument& instrument, double arrival_s) const {
+  // A longer delay, or one below 0, is that of a recording by two clocks.
+  constexpr double longest_s = WristHistory::kept_s - WristHistory::near_s;
+  const double delay_s = instrument.image_delay_s.value_or(0);
+  const double exposure_s = arrival_s - (delay_s >= 0 && delay_s <= longest_s ? delay_s : 0);
   const std::lock_guard lock(mutex_);
-  const std::vector<std::string> names = wrist_names(tool);
-  if (names.empty() || latest_.positions.size() != latest_.names.size() || clock_.now_s() - came_s_ > too_old_s)
-    return {};
-  std::vector<double> readings_rad = wrist_in(latest_, names);
-  for (const double reading_rad : readings_rad)
-    if (!std::isfinite(reading_rad)) return {};
-  return readings_rad;
+  return history_.at(wrist_names(instrument.tool), exposure_s);
 }
 
 }  // namespace lapservo::app
