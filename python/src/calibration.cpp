@@ -101,16 +101,19 @@ py::dict calibrate_camera(const py::list& pictures, const std::string& corners, 
   const Camera before = given ? given->rig.camera : Camera{};
   const JobWatch watch = watch_of(progress);
   BoardRecordings recordings(board, most_views, given ? std::optional(given->rig) : std::nullopt);
-  std::string name;
+  const bool several = pictures.size() > 1;
+  std::string name, complaint;
   for (const py::handle each : pictures) {
     constexpr double fps = 30;
-    const GivenFrames frames(py::reinterpret_borrow<py::object>(each), fps, false);
+    const GivenFrames frames(py::reinterpret_borrow<py::object>(each), fps, given ? &given->rig.camera : nullptr, false,
+                             false);
     name = name.empty() || name == frames.name ? frames.name : name + " and others";
     const py::gil_scoped_release others_run;
     recordings.look_at(*frames.source, frames.name, watch);
+    if (const std::string& latest = recordings.read().complaint; !latest.empty())
+      complaint.append(complaint.empty() ? "" : "; ").append(several ? frames.name + ": " : "").append(latest);
   }
   const std::vector<std::string> without_board = recordings.without_board();
-  const std::string complaint = recordings.read().complaint;
   CameraMeasurement measured;
   {
     const py::gil_scoped_release others_run;
@@ -140,7 +143,7 @@ py::dict calibrate_colour(const py::object& frames, const py::object& rig, const
                           bool replace_response, bool deinterlace, double fps, const py::object& progress) {
   const GivenRig given = rig_of(rig);
   const std::size_t index = index_of(given, instrument);
-  const GivenFrames source(frames, fps);
+  const GivenFrames source(frames, fps, &given.rig.camera, deinterlace);
   const bool keep_response = !replace_response && given.rig.camera.response.sigma.has_value();
   ColourMeasurement measured;
   {
@@ -209,7 +212,7 @@ py::dict calibrate_marker(const py::object& frames, const py::object& rig, const
   if (!joints.is_none()) expect_registration(before, given.name(), "joints");
   std::optional<JointsOfTurn> turn;
   if (auto read = joints_of(joints, before, given.name())) turn = {std::move(read->recording), read->source};
-  const GivenFrames source(frames, fps);
+  const GivenFrames source(frames, fps, &given.rig.camera, deinterlace);
   MarkerMeasurement measured;
   {
     const py::gil_scoped_release others_run;
@@ -250,7 +253,7 @@ py::dict calibrate_registration(const py::object& frames, const py::object& rig,
   Instrument instrument = given.rig.instruments[index];
   const bool table = is_path(frames) && frames.cast<fs::path>().extension() == ".csv";
   std::optional<GivenFrames> source;
-  if (!table) source.emplace(frames, fps);
+  if (!table) source.emplace(frames, fps, &given.rig.camera, deinterlace);
   const std::string name = table ? frames.cast<fs::path>().string() : source->name;
   const auto read = joints_of(joints, instrument, given.name());
   if (read) instrument.joints = read->joints;

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "cameras/camera.h"
+#include "lapservo/calibration/recording/frame_recording.h"
 #include "lapservo/core/error.h"
 #include "recordings/bag_frames.h"
 #include "recordings/open_bag.h"
@@ -92,15 +93,18 @@ bool is_path(const py::object& given) {
   return py::isinstance<py::str>(given) || py::hasattr(given, "__fspath__");
 }
 
-GivenFrames::GivenFrames(const py::object& given, double fps, bool of_one_recording) : kept(given), name(named) {
+GivenFrames::GivenFrames(const py::object& given, double fps, const Camera* camera, bool deinterlace,
+                         bool of_one_recording)
+    : kept(given), name(named) {
   check_rate(fps);
   if (is_path(given)) {
     name = given.cast<std::filesystem::path>().string();
-    owned = open_path(name, fps);
+    owned = open_path(name, fps, {deinterlace || (camera && camera->deinterlace)});
   } else if (!py::isinstance<FrameSource>(given)) {
     owned = std::make_unique<IteratedFrames>(given, fps, of_one_recording);
   }
   source = owned ? owned.get() : given.cast<FrameSource*>();
+  if (camera) internal::expect_srgb(*source, name, camera->response);
 }
 
 }  // namespace lapservo::python

@@ -3,6 +3,7 @@
 #include <optional>
 #include <string>
 
+#include "lapservo/geometry/camera.h"
 #include "lapservo/io/frame_source.h"
 #include "python/src/conversions.h"
 
@@ -20,10 +21,11 @@ bool is_path(const py::object& given);
 /// that is iterated over: uint8[H, W, 3], (time_s, uint8[H, W, 3]) or Frame. Created and destroyed with Python's lock,
 /// used without.
 struct GivenFrames {
-  /// `fps` gives times to the images of a folder and to those without. Throws InputError as
-  /// internal::open_camera_or_file(). Refuses an iterated frame whose time is not finite or, `of_one_recording`,
-  /// does not rise.
-  GivenFrames(const py::object& given, double fps, bool of_one_recording = true);
+  /// `fps` gives times to the images of a folder and to those without; `camera`, or null, and `deinterlace` say how a
+  /// path is read. Throws InputError as internal::open_camera_or_file() and internal::expect_srgb(). Refuses an
+  /// iterated frame whose time is not finite or, `of_one_recording`, does not rise.
+  GivenFrames(const py::object& given, double fps, const Camera* camera, bool deinterlace,
+              bool of_one_recording = true);
 
   py::object kept;  ///< what `source` is of
   std::unique_ptr<FrameSource> owned;

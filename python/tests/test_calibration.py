@@ -1,8 +1,11 @@
 """Calibrations: the same rig, byte for byte, as the command line writes, by paths and by arrays."""
 
 import pickle
+import shutil
 import signal
+import struct
 import subprocess
+import zlib
 
 import numpy as np
 import pytest
@@ -117,6 +120,16 @@ def test_a_camera_is_the_command_lines(sample, boards, tmp_path):
     assert np.array_equal(pickle.loads(pickle.dumps(result)).camera.matrix, result.camera.matrix)
 
 
+@pytest.mark.skipif(not shutil.which("ffmpeg"), reason="no ffmpeg")
+def test_each_recording_of_a_board_says_what_is_wrong_with_it(sample, tmp_path):
+    cut, whole = tmp_path / "cut.mkv", tmp_path / "whole.mkv"
+    subprocess.run(["ffmpeg", "-v", "error", "-framerate", "1", "-pattern_type", "glob", "-i", sample / "boards" / "*.png",
+                    "-c:v", "ffv1", whole], check=True)
+    cut.write_bytes(whole.read_bytes()[:whole.stat().st_size * 4 // 5])
+    result = lapservo.calibrate_camera([cut, whole], "9x6", 0.005)
+    assert result.complaint.startswith(f"{cut}: ends early") and str(whole) not in result.complaint
+
+
 def test_a_cameras_own_file_is_named_from_anywhere_and_never_written_over(recordings, swing, monkeypatch):
     images, _ = swing
     home, elsewhere = recordings.folder / "home", recordings.folder / "elsewhere"
@@ -181,6 +194,21 @@ def test_what_does_not_tell_is_refused(recordings, rig):
     backwards = {"time_s": [1.0, 0.5], "a": [0, 0], "b": [0, 0], "c": [0, 0], "d": [0, 0]}
     assert refused(lapservo.calibrate_registration, [grey], free, joints=backwards).value == "0.5"
     assert "item" == refused(lapservo.calibrate_registration, [None], rig).field
+
+
+def test_pictures_in_another_light_are_refused_as_on_the_command_line(recordings, swing):
+    folder, chunk = recordings.folder / "linear", b"gAMA" + struct.pack(">I", 100000)
+    folder.mkdir()
+    for path in sorted((recordings.folder / "swing").glob("*.png"))[:12]:
+        png = path.read_bytes()
+        (folder / path.name).write_bytes(png[:33] + struct.pack(">I", 4) + chunk + struct.pack(">I", zlib.crc32(chunk)) +
+                                         png[33:])
+    camera = recordings.rig.camera
+    rig = lapservo.Rig(lapservo.Camera(camera.width_px, camera.height_px, camera.matrix, response=1.7),
+                       recordings.rig.instruments)
+    for frames in (folder, lapservo.open_frames(folder, fps=FPS)):
+        for calibrate in (lapservo.calibrate_colour, lapservo.calibrate_marker, lapservo.calibrate_registration):
+            assert "is read as sRGB" in refused(calibrate, frames, rig, fps=FPS).problem
 
 
 @pytest.mark.parametrize("times", [(0.0, float("nan")), (0.0, float("inf")), (0.0, 0.0), (1.0, 0.5)])

@@ -6,6 +6,7 @@
 
 #include "apps/lapservo/cli/interrupt.h"
 #include "cameras/camera.h"
+#include "lapservo/calibration/recording/frame_recording.h"
 #include "lapservo/core/error.h"
 #include "lapservo/io/half_frames.h"
 #include "lapservo/io/video/read_ahead.h"
@@ -23,14 +24,6 @@ void say_remark(const std::string& input, const std::string& remark) {
 }
 
 namespace {
-
-// A response that was measured was measured with images that were read so.
-void expect_srgb(const std::string& input, const Response& response) {
-  if (response.kind == Response::Kind::srgb || response.sigma) return;
-  throw InputError(input,
-                   "names how it encodes light, which is read as sRGB, but the rig's response is another, "
-                   "expected srgb, or one that calibrate camera or colour measured");
-}
 
 // `layout`: LR or RL where the input says that it has both eyes.
 std::unique_ptr<FrameSource> of_one_eye(std::unique_ptr<FrameSource> frames, const std::string& input,
@@ -74,7 +67,7 @@ WholeFrames open_whole(const std::string& input, const FrameOptions& options, co
 std::unique_ptr<FrameSource> open_frames(const std::string& input, const FrameOptions& options, const Camera* camera) {
   WholeFrames whole = open_whole(input, options, camera);
   auto source = of_one_eye(std::move(whole.source), input, options, whole.layout);
-  if (source->is_srgb() && camera) expect_srgb(input, camera->response);
+  if (camera) expect_srgb(*source, input, camera->response);
   say_remark(input, source->remark());
   return source->kind() == FrameSource::Kind::live ? std::move(source) : read_ahead(std::move(source));
 }

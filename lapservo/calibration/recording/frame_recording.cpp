@@ -18,6 +18,13 @@ std::string FramesRead::remark_on_damaged() const {
   return damaged > 0 ? fmt::format(" ({} are damaged)", damaged) : "";
 }
 
+void expect_srgb(const FrameSource& source, const std::string& recording, const Response& response) {
+  if (!source.is_srgb() || response.kind == Response::Kind::srgb || response.sigma) return;
+  throw InputError(recording,
+                   "names how it encodes light, which is read as sRGB, but the rig's response is another, "
+                   "expected srgb, or one that calibrate camera or colour measured");
+}
+
 void check_frame_size(const Frame& frame, const std::string& recording, const cv::Size& expected,
                       const std::string& whose) {
   if (frame.bgr.size() != expected)

@@ -47,6 +47,10 @@ struct FramesRead {
   std::string remark_on_damaged() const;
 };
 
+/// Throws InputError, naming `recording`, where that says how it encodes light, which is undone, and the rig's response
+/// is neither sRGB nor measured with images that were read so.
+void expect_srgb(const FrameSource& source, const std::string& recording, const Response& response);
+
 /// Throws InputError, naming the frame's file or else `recording`, at a frame of another size than `whose`.
 void check_frame_size(const Frame& frame, const std::string& recording, const cv::Size& expected,
                       const std::string& whose);
