@@ -147,13 +147,14 @@ void Interlock::on_setpoint(const JointMessage& message, double arrival_s) {
   const auto time_s = stamped(setpoint_clock_, message, arrival_s);
   if (!time_s) return;
   setpoint_ = Reading{*time_s, arrival_s, message.positions, {}, q_of(message, *places)};
-  if (phase_ == Phase::idle) {
-    names_ = message.names;
-    places_ = *places;
-  } else if (config_.motion_enabled && (message.names != names_ || !is_ours(*setpoint_) || goes_back(*setpoint_))) {
-    on_foreign_command(arrival_s);
-  } else {
+  const bool goes_on = phase_ != Phase::idle || continues_;
+  if (goes_on && message.names == names_ && is_ours(*setpoint_) && !goes_back(*setpoint_)) {
     pass_wrist_through();
+  } else if (goes_on && config_.motion_enabled) {
+    on_foreign_command(arrival_s);
+  } else if (phase_ == Phase::idle) {
+    names_ = message.names, places_ = *places;
+    continues_ = false;
   }
   watch_rest(arrival_s);
   watch(arrival_s);
@@ -295,7 +296,7 @@ JointState Interlock::state(double now_s) {
 }
 
 void Interlock::start(double now_s) {
-  if (phase_ == Phase::idle && !(continues_ && is_ours(*setpoint_))) {
+  if (phase_ == Phase::idle && !continues_) {
     last_ = setpoint_->q;
     velocity_.setZero();
     others_ = setpoint_->positions;
@@ -304,6 +305,7 @@ void Interlock::start(double now_s) {
   }
   shift_ = last_ - path_->at(now_s).position;
   phase_ = Phase::following;
+  continues_ = false;
 }
 
 Eigen::Vector4d Interlock::within_limits(const Eigen::Vector4d& wanted) const {
@@ -378,7 +380,9 @@ std::optional<std::vector<double>> Interlock::tick(double now_s) {
   watch(now_s);
   if (path_ && !path_->at(now_s).position.allFinite()) stop(Blocked::non_finite_joints);
   if (phase_ == Phase::braking && !path_) {
-    velocity_ = brake(config_.limits, velocity_, config_.period_s);
+    // Each joint by itself: so all rest within the limits that they approach.
+    const Eigen::Vector4d change = config_.period_s * config_.limits.acceleration;
+    velocity_ -= velocity_.cwiseMin(change).cwiseMax(-change);
     last_ += config_.period_s * velocity_;
     if (velocity_.isZero()) phase_ = Phase::idle;
     return send(now_s);

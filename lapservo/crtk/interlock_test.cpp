@@ -188,6 +188,14 @@ TEST(Interlock, TheWristPassesThrough) {
   }
   EXPECT_EQ(fastest_rad, 0);  // once it moves it follows at once
   EXPECT_GT(bench.sent_count, 500);
+  bench.talking = false;  // it moves on while the arm is silent
+  bench.control(0.3, slow);
+  bench.talking = true;
+  bench.wrist += 0.4;
+  const int sent = bench.sent_count;
+  bench.control(0.5, slow);
+  EXPECT_GT(bench.sent_count, sent + 200);
+  EXPECT_EQ(bench.last_wrist, bench.wrist);
 }
 
 // Sent back, the arm's rounding would add up.
@@ -238,6 +246,20 @@ TEST(Interlock, StaysWithinTheLimitsAndComesBackFromBeyond) {
   EXPECT_NEAR(beyond.setpoint[0], 0.3, 1e-9);
   beyond.control(1, {-0.2, 0, 0, 0});  // half of it brings the path back
   EXPECT_LT(beyond.setpoint[0], 0.25);
+}
+
+// Another joint that needs longer to stop takes none beyond its limit.
+TEST(Interlock, BrakesWithinTheLimits) {
+  for (const double before_s : {0.0, 0.03, 0.06, 0.1}) {
+    InterlockConfig config = config_of();
+    config.limits.upper = Eigen::Vector4d(0.15, 2.5, 0.2, 4);
+    Bench bench(config);
+    bench.setpoint[0] = 0.05;
+    bench.control(0.5 - before_s, {0.2, 0, 0, config.limits.rate[3]});
+    bench.talking = false;
+    bench.control(0.5, slow);
+    EXPECT_LE(bench.setpoint[0], 0.15) << before_s;
+  }
 }
 
 struct Fault {
@@ -406,6 +428,19 @@ TEST(Interlock, APauseOfTheArmIsBrakedAndNobodysCommand) {
         EXPECT_NEAR(bench.interlock.counts().longest_pause_s, pause_s, 0.03);
       }
     }
+}
+
+TEST(Interlock, AnArmThatIsElsewhereAfterAPauseObeysSomebodyElse) {
+  Bench bench;
+  bench.control(0.3, slow);
+  bench.talking = false;
+  bench.control(0.3, slow);
+  bench.talking = true;
+  bench.setpoint[0] += 0.02;
+  const int sent = bench.sent_count;
+  bench.control(0.05, slow);
+  EXPECT_EQ(bench.blocked, Blocked::foreign_command);
+  EXPECT_EQ(bench.sent_count, sent);
 }
 
 // Setpoints that leave late are no reason to hurry: pass() checks rates and accelerations.
