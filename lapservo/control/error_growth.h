@@ -7,7 +7,9 @@
 
 namespace lapservo::internal {
 
-/// Notices an error that grows while the goal stands: motion that should make it smaller does the opposite.
+/// Notices an error that grows while the goal stands: motion that should make it smaller does the opposite. A goal
+/// stands within 5 feature scales of where it was, at less than 1 a second: images correct goals of the tip and those
+/// before a moving endoscope.
 class ErrorGrowth {
  public:
   explicit ErrorGrowth(const Scales& scales) : scales_(scales) {}

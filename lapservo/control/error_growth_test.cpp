@@ -30,6 +30,14 @@ TEST(ErrorGrowth, IsAnErrorThatGrowsForAGoalThatStands) {
   }
 }
 
+// Each image corrects the goal of a tip a little.
+TEST(ErrorGrowth, IsOneWhereImagesCorrectTheGoal) {
+  ErrorGrowth growth{Scales()};
+  bool said = false;
+  for (int k = 0; k <= 100; ++k) said |= growth.add(goal(400 + k % 3, 0.2 * (k % 3 - 1)), {0, 30 + 0.5 * k, 0, 0});
+  EXPECT_TRUE(said);
+}
+
 TEST(ErrorGrowth, IsNoneWhereTheGoalMoves) {
   ErrorGrowth growth{Scales()};
   EXPECT_FALSE(grows(growth, goal(400, 5), 1, 300));
