@@ -120,7 +120,8 @@ void LivePage::fetch() {
 
 PageWishes LivePage::take_wishes() {
   PageWishes wishes;
-  if (is_recent(start_s_.exchange(never))) wishes.hold = false;
+  if (const double asked_s = start_s_.exchange(never); is_recent(asked_s))
+    wishes.hold = false, wishes.start_age_s = std::max(0.0, now_s() - asked_s);
   if (hold_.exchange(false)) wishes.hold = true;  // of two between ticks, the one that holds
   wishes.stop = stop_;
   if (const auto wish = tips_.take()) {

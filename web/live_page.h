@@ -61,6 +61,7 @@ struct PageWishes {
     bool too_late = false;  ///< not taken within a second: void, its sender does not expect motion any more
   };
   std::optional<bool> hold;  ///< true: hold; false: start; the last one
+  double start_age_s = 0;    ///< since that start was requested: a hold may have come before it
   bool stop = false;         ///< end the run
   std::optional<Tip> tip;
 };

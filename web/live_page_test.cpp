@@ -185,6 +185,8 @@ TEST(LivePage, StartsNothingLate) {
   std::this_thread::sleep_for(std::chrono::milliseconds(520));
   EXPECT_TRUE(page.tells(R"("asked":"")"));
   EXPECT_FALSE(page.take_wishes().hold);
+  EXPECT_EQ(page.post(start_path(0.3)), 202);
+  EXPECT_NEAR(page.take_wishes().start_age_s, 0.3, 0.2) << "a hold may have come in between";
   // A hold counts late too.
   EXPECT_EQ(page.post("/hold"), 202);
   std::this_thread::sleep_for(std::chrono::milliseconds(20));

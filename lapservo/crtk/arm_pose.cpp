@@ -10,7 +10,7 @@
 namespace lapservo::internal {
 namespace {
 
-constexpr double late_s = 0.07, memory_s = 3, by_motion_of_s = 0.05, ahead_s = 0.1;
+constexpr double late_s = 0.07, silence_s = 0.5, memory_s = 3, by_motion_of_s = 0.05, ahead_s = 0.1;
 
 // From one pose on to another by that share of the way, which may be above 1.
 Rigid3 between(const Rigid3& from, const Rigid3& to, double share) {
@@ -38,12 +38,24 @@ void ArmPose::take(const PlaceMessage& message, bool local) {
   if (!translation.allFinite() || !(std::abs(rotation.norm() - 1) < plain)) return;
   const std::lock_guard lock(mutex_);
   if (local_ && !local) return;
-  if (local && !local_) stamps_ = StampClock(late_s), poses_.clear();
+  const bool other_topic = local && !local_;
   local_ = local;
+  if (!other_topic && source_.value_or(message.source) != message.source && arrival_s - heard_s_ <= silence_s) {
+    second_s_ = arrival_s;
+    return poses_.clear();
+  }
+  if (other_topic || source_ != message.source) stamps_ = StampClock(late_s), poses_.clear();
+  source_ = message.source, heard_s_ = arrival_s;
+  if (arrival_s - second_s_ <= silence_s) return;
   const StampClock::Reading reading = stamps_.read(message.stamp_s, arrival_s);
   if (reading.verdict != StampVerdict::fresh || (!poses_.empty() && reading.time_s <= poses_.back().time_s)) return;
   poses_.push_back({reading.time_s, {rotation.normalized(), translation}});
   while (poses_.back().time_s - poses_.front().time_s > memory_s) poses_.pop_front();
+}
+
+bool ArmPose::has_two_senders() const {
+  const std::lock_guard lock(mutex_);
+  return clock_.now_s() - second_s_ <= silence_s;
 }
 
 std::optional<Rigid3> ArmPose::newest() const {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <deque>
 #include <mutex>
 #include <optional>
@@ -14,7 +15,7 @@
 namespace lapservo::internal {
 
 /// The pose that a CRTK arm reports: local/measured_cp, or measured_cp of an arm that has no other. Poses that are not
-/// finite, or whose rotation is none, do not count.
+/// finite, or whose rotation is none, do not count; while two programs publish, nobody's do.
 class ArmPose {
  public:
   /// `arm`: as in CrtkRobot. The transport and the clock must outlive it.
@@ -26,6 +27,7 @@ class ArmPose {
   /// On the clock, by stamps (StampClock): within the last 3 s interpolated, up to 0.1 s after the newest extrapolated
   /// by the motion of the last 0.05 s; else nullopt.
   std::optional<Rigid3> at(double time_s) const;
+  bool has_two_senders() const;
 
  private:
   struct Pose {
@@ -39,6 +41,9 @@ class ArmPose {
   StampClock stamps_;
   std::deque<Pose> poses_;
   bool local_ = false;
+  std::optional<std::uint64_t> source_;                 ///< whose poses count
+  double heard_s_ = 0;                                  ///< when it was heard last
+  double second_s_ = -1e9;                              ///< when another one was
   std::vector<Transport::Subscription> subscriptions_;  // last: they use the others
 };
 

@@ -21,9 +21,9 @@ struct MessageClock : Clock {
 class ArmPoseTest : public ::testing::Test {
  protected:
   // From a computer whose clock is 100 s ahead, 10 ms on its way.
-  void say(const std::string& topic, double time_s, const Rigid3& pose) {
+  void say(const std::string& topic, double time_s, const Rigid3& pose, std::uint64_t source = 0) {
     clock_.now = time_s + 0.01;
-    transport_.say(topic, PlaceMessage{time_s + 100, "", pose});
+    transport_.say(topic, PlaceMessage{time_s + 100, "", pose, source});
   }
   static Rigid3 at(double x) { return {Eigen::Quaterniond::Identity(), {x, 0, 0}}; }
 
@@ -46,6 +46,21 @@ TEST_F(ArmPoseTest, OneThatIsNoneDoesNotCount) {
   say("/ECM/measured_cp", 1, at(std::numeric_limits<double>::quiet_NaN()));
   say("/ECM/measured_cp", 2, {Eigen::Quaterniond(0, 0, 0, 0), {1, 0, 0}});
   EXPECT_FALSE(pose.newest());
+}
+
+// Two simulators of one name, for example: whose poses are right, nobody knows.
+TEST_F(ArmPoseTest, OfTwoProgramsNobodysPosesCount) {
+  const ArmPose pose(transport_, "ECM", clock_);
+  say("/ECM/measured_cp", 1, at(1), 7);
+  say("/ECM/measured_cp", 1.1, at(5), 8);
+  say("/ECM/measured_cp", 1.2, at(1), 7);
+  EXPECT_FALSE(pose.newest());
+  EXPECT_TRUE(pose.has_two_senders());
+  say("/ECM/measured_cp", 1.65, at(2), 7);
+  EXPECT_FALSE(pose.has_two_senders());
+  EXPECT_EQ(pose.newest()->translation.x(), 2);
+  say("/ECM/measured_cp", 2.3, at(3), 8);  // after it
+  EXPECT_EQ(pose.newest()->translation.x(), 3);
 }
 
 // A constant twist comes back at every time between the messages and 0.1 s beyond, and nothing farther. The time is the

@@ -49,7 +49,7 @@ class ImageReceiver : public ImageStream {
   std::string complaint() const;
   /// True once when another sender appears beside the one that counts, or after it; and again after its absence of
   /// 0.5 s.
-  bool take_second_sender();
+  bool take_second_sender() override;
 
  private:
   using Message = std::variant<ImageMessage, CompressedImageMessage>;

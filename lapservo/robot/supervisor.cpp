@@ -53,6 +53,7 @@ JointState Supervisor::state() {
   operating_state_ = state.other_state.empty() ? to_string(state.operating_state) : state.other_state;
   input_.time_s = clock_.now_s();
   input_.arm = arm_of(state, input_.time_s, config_.max_reading_age_s);
+  if (input_.arm == Blocked::none) input_.arm = std::exchange(reported_, Blocked::none);
   input_.follows = state.follows;
   constexpr double plain_s = 0.05;  // two clocks are not read at the same time
   const double before_s = std::exchange(suspended_s_, clock_.suspended_s());

@@ -35,8 +35,9 @@ class Supervisor : public Robot {
   /// The loop's decision: empty where the arm is to move, else why it holds, in words. `event`: Blocked::displaced or
   /// Blocked::loop_held where that needs a start at once.
   void tell_loop(const std::string& hold_reason, Blocked event = Blocked::none);
-  /// Something that needs a start at once, seen outside of the loop's step.
-  void report(Blocked event) { input_.loop_event = event; }
+  /// Something that needs a start, seen outside of the loop's step; it counts in the next step in which the arm is
+  /// ready, armed or not.
+  void report(Blocked event) { reported_ = event; }
   /// Whether the operator presses what has to be pressed, now.
   void watch_operator(std::function<bool()> is_present) { is_present_ = std::move(is_present); }
   /// The arm comes to rest and stays held, whatever is said.
@@ -63,6 +64,7 @@ class Supervisor : public Robot {
   std::optional<JointPath> path_;  ///< the last one sent
   std::string operating_state_;    ///< as the arm calls it
   std::string loop_reason_;
+  Blocked reported_ = Blocked::none;
   std::function<bool()> is_present_;
   double suspended_s_;  ///< Clock::suspended_s() in the step before
 };

@@ -325,6 +325,21 @@ TEST(Supervisor, AStartThatWasSaidBeforeTheHoldIsVoid) {
   EXPECT_TRUE(bench.moves(0.8));
 }
 
+// Armed or not.
+TEST(Supervisor, WhatIsReportedNeedsAStart) {
+  for (const double after_s : {0.0, 0.3, 1.0}) {
+    Bench bench;
+    bench.pass(after_s);
+    bench.supervisor.report(Blocked::second_camera);
+    bench.supervisor.tell_loop("");
+    bench.pass(0.3);
+    EXPECT_FALSE(bench.moves(1)) << after_s;
+    EXPECT_EQ(bench.supervisor.blocked(), Blocked::second_camera);
+    bench.start();
+    EXPECT_TRUE(bench.moves(1));
+  }
+}
+
 TEST(Supervisor, WithoutTheOperatorNothingMoves) {
   Bench bench;
   bool present = false;

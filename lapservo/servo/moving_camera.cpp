@@ -84,7 +84,8 @@ void MovingCamera::carry(ImageMeasurement& image, const Rigid3& first_from_camer
   }
   const Eigen::Matrix4d first_by_here = first->jacobian * damped_inverse(there->jacobian, scales_).inverse;
   image.features = first->features + first_by_here * seen->residual;
-  image.covariance = first_by_here * image.covariance * first_by_here.transpose();
+  const Eigen::Matrix4d covariance = first_by_here * image.covariance * first_by_here.transpose();
+  image.covariance = 0.5 * (covariance + covariance.transpose());  // a log holds one half of it
   image.ends_px += first->ends_px - there->ends_px;
 }
 

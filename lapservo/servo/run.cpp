@@ -141,6 +141,13 @@ void watch_tip(ControlTick& tick, const Trajectory& trajectory, double start_s,
 
 }  // namespace
 
+ControllerConfig controller_of(const RunConfig& config) {
+  ControllerConfig controller = config.controller;
+  if (config.arm_limits) controller.limits = *config.arm_limits;
+  if (config.endoscope) controller.window.reset();
+  return controller;
+}
+
 void run(Robot& robot, ImageStream& images, Clock& clock, const RunConfig& config, const Trajectory& trajectory,
          double duration_s, RunObserver& observer) {
   Supervisor arm(robot, clock);
@@ -150,10 +157,9 @@ void run(Robot& robot, ImageStream& images, Clock& clock, const RunConfig& confi
 void run(Supervisor& arm, ImageStream& images, Clock& clock, const RunConfig& config, const Trajectory& trajectory,
          double duration_s, RunObserver& observer) {
   refuse_at_once(arm, clock, config, duration_s);
-  ControllerConfig controller = config.controller;
-  if (config.arm_limits) controller.limits = *config.arm_limits;
+  const ControllerConfig controller = controller_of(config);
   std::optional<MovingCamera> moving;
-  if (config.endoscope) moving.emplace(*config.endoscope, config.rig, controller.scales), controller.window.reset();
+  if (config.endoscope) moving.emplace(*config.endoscope, config.rig, controller.scales);
   TipGoals tips(config.rig, controller.scales);
   if (trajectory.tip_at(0)) tips.refuse_incomplete(config.trajectory_name, false);
   const Trajectory features = tips.features_of(trajectory);
@@ -172,6 +178,7 @@ void run(Supervisor& arm, ImageStream& images, Clock& clock, const RunConfig& co
     ControlTick tick;
     tick.seen = vision->newest();
     tick.input.time_s = clock.now_s();
+    if (images.take_second_sender()) arm.report(Blocked::second_camera);
     tick.input.readings = arm.readings();
     tick.input.joints = arm.state();
     const double since_s = tick.input.time_s - start_s;

@@ -34,6 +34,9 @@ struct RunConfig {
   const EndoscopePose* endoscope = nullptr;
 };
 
+/// As run() uses it: within arm_limits, and without a window of the image where the endoscope moves.
+ControllerConfig controller_of(const RunConfig& config);
+
 /// One control tick: what the loop went by, what it decided, and the image that came, if one did.
 struct ControlTick {
   ServoInput input;

@@ -638,20 +638,25 @@ TEST(Run, DoesNotHoldAnEndoscopeThatRests) {
 
 // The same seed gives the same run, and the log is enough to decide everything again.
 TEST(Run, RepeatsAndReplaysBitForBit) {
-  for (const ControlMode mode : {ControlMode::fused, ControlMode::paper}) {
-    Case c;
-    c.seed = 4;
-    c.duration_s = 2;
-    c.mode = mode;
-    const PastRun first = run_case(c), second = run_case(c);
+  Case c;
+  c.seed = 4;
+  c.duration_s = 2;
+  Case by_paper = c, of_moving_endoscope = c;
+  by_paper.mode = ControlMode::paper;
+  of_moving_endoscope.endoscope = {0.3, 1, {0.005, -0.005, 0}, {0, 0.05, 0.05}, MotionProfile::smooth};
+  of_moving_endoscope.arm_error_rad = 0;
+  for (const Case& one : {c, by_paper, of_moving_endoscope}) {
+    const PastRun first = run_case(one), second = run_case(one);
     ASSERT_EQ(first.records.size(), second.records.size());
     for (std::size_t i = 0; i < first.records.size(); ++i)
       ASSERT_EQ(decision_fields(first.records[i].decision), decision_fields(second.records[i].decision)) << i;
-    const RunConfig config = config_of(testing::small_test_rig(), c);
+    RunConfig config = config_of(testing::small_test_rig(), one);
+    const EndoscopeOfAnArm held({}, 0);
+    if (one.endoscope) config.endoscope = &held;
     auto ticks = logged(first);
-    EXPECT_FALSE(replay(ticks, config.rig, config.controller));
+    EXPECT_FALSE(replay(ticks, config.rig, controller_of(config)));
     ticks[70].input.desired.features[1] += 1e-9;
-    EXPECT_TRUE(replay(ticks, config.rig, config.controller));
+    EXPECT_TRUE(replay(ticks, config.rig, controller_of(config)));
   }
 }
 

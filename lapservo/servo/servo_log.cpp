@@ -45,7 +45,7 @@ std::string covariance_column(int row, int column) {
 }
 
 std::vector<std::string> make_input_columns() {
-  std::vector<std::string> columns{"time_s", "arm_state", "arm_blocked", "arm_follows", "arm_started"};
+  std::vector<std::string> columns{"time_s", "arm_state", "arm_blocked", "arm_follows", "arm_started", "joint_time_s"};
   name(columns, "joint_", joints);
   columns.emplace_back("readings");
   columns.insert(columns.end(), {"image", "image_time_s", "image_registration", "image_repetition"});
@@ -118,6 +118,7 @@ std::vector<std::string> input_fields(const ServoInput& input) {
   fields.emplace_back(to_string(input.joints.blocked));
   fields.emplace_back(input.joints.follows ? "1" : "0");
   fields.emplace_back(input.joints.started ? "1" : "0");
+  write(fields, input.joints.time_s);
   write(fields, input.joints.q.vector());
   fields.push_back(text_of(input.readings));
   write_image(fields, input.image);
@@ -208,7 +209,7 @@ std::optional<ImageMeasurement> read_image(const Row& row) {
 ServoInput read_input(const Row& row) {
   ServoInput input;
   input.time_s = row.number("time_s");
-  input.joints.time_s = input.time_s;
+  input.joints.time_s = row.number("joint_time_s");
   input.joints.q = JointVector::from_vector(row.numbers("joint_", joints));
   const auto state = operating_state_from_string(row.text("arm_state"));
   if (!state) row.complain("arm_state", "DISABLED, ENABLED, PAUSED or FAULT");

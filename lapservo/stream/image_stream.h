@@ -20,6 +20,9 @@ class ImageStream {
   virtual ~ImageStream() = default;
   /// The newest image that came since the last call, if any.
   virtual std::optional<StampedImage> newest() = 0;
+  /// By the loop's thread: true once when another camera's images come beside this one's, or after them. The loop holds
+  /// then until a start.
+  virtual bool take_second_sender() { return false; }
 };
 
 }  // namespace lapservo

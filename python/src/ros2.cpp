@@ -47,6 +47,7 @@ class Ros2Camera : private Node, public ImageStream {
                                                    : transport.subscribe_images(topic, sink);
   }
   std::optional<StampedImage> newest() override { return receiver_.newest(); }
+  bool take_second_sender() override { return receiver_.take_second_sender(); }
   std::string dropped() const { return receiver_.counts().text(); }
   std::string complaint() const { return receiver_.complaint(); }
 

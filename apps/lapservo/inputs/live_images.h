@@ -63,8 +63,7 @@ class LiveImages : public ImageStream {
   internal::ImageCounts counts() const { return receiver_.counts(); }
   std::string complaint() const { return receiver_.complaint(); }
   std::optional<std::string> ended() const { return input_.ended(); }
-  /// See internal::ImageReceiver.
-  bool take_second_sender() { return receiver_.take_second_sender(); }
+  bool take_second_sender() override { return receiver_.take_second_sender(); }
 
  private:
   ImageSink sink();

@@ -49,20 +49,23 @@ std::optional<std::string> ChangingGoal::result(const ServoDecision& decision, d
 void ChangingGoal::check_next(const ControlTick& tick) {
   const ServoDecision& decision = tick.decision;
   const bool being_measured = run_.rig.instruments.front().camera_from_rcm && !decision.camera_from_rcm;
-  if (!wanted_ || refusal_.valid() || being_measured) return;
+  const auto first_from_camera = run_.endoscope ? run_.endoscope->first_from_camera(tick.input.time_s) : Rigid3();
+  if (!wanted_ || refusal_.valid() || being_measured || !first_from_camera) return;
+  std::optional<Rigid3> camera_from_rcm = decision.camera_from_rcm;
+  if (camera_from_rcm) camera_from_rcm = first_from_camera->inverse() * *camera_from_rcm;
   asked_ = *std::exchange(wanted_, std::nullopt);
   asked_.registration = decision.registration;
   // A long trajectory takes longer to walk along than a tick has.
-  refusal_ = std::async(
-      std::launch::async,
-      [this, wanted = asked_, joints = tick.input.joints, rcm = decision.camera_from_rcm]() -> std::string {
-        try {
-          refuse_goal(wanted.trajectory, wanted.duration_s, run_.rig, rcm, run_.controller, joints, wanted.name);
-        } catch (const InputError& error) {
-          return error.what();
-        }
-        return {};
-      });
+  refusal_ = std::async(std::launch::async,
+                        [this, wanted = asked_, joints = tick.input.joints, camera_from_rcm]() -> std::string {
+                          try {
+                            refuse_goal(wanted.trajectory, wanted.duration_s, run_.rig, camera_from_rcm,
+                                        controller_of(run_), joints, wanted.name);
+                          } catch (const InputError& error) {
+                            return error.what();
+                          }
+                          return {};
+                        });
 }
 
 }  // namespace lapservo::app

@@ -48,11 +48,13 @@ std::string name_in_use(const Rig& rig) {
 class ArmWatcher : public RunWatcher {
  public:
   ArmWatcher(const ServoOptions& options, std::unique_ptr<RunFolder> folder, Supervisor& arm, ServoPage* page,
-             const RunConfig& run, const CrtkRobot& robot, LiveImages& images, LoopTopics& topics, ChangingGoal& goal)
+             const RunConfig& run, const CrtkRobot& robot, const ArmPose* endoscope, LiveImages& images,
+             LoopTopics& topics, ChangingGoal& goal)
       : RunWatcher(options, std::move(folder), &arm, page),
         run_(run),
         arm_(arm),
         robot_(robot),
+        endoscope_(endoscope),
         images_(images),
         topics_(topics),
         goal_(goal) {}
@@ -65,10 +67,12 @@ class ArmWatcher : public RunWatcher {
     }
     if (is_new_state()) say(time_s, state());
     say_images(time_s);
+    const bool two_endoscopes = endoscope_ && endoscope_->has_two_senders();
+    if (!std::exchange(two_endoscopes_, two_endoscopes) && two_endoscopes)
+      say(time_s, options_.endoscope + ": two programs publish its pose, so it is not known: end one of them");
     topics_.publish(tick, state() == to_string(ControlAction::track) ? "" : state());
     obey(topics_.wishes(), tick, time_s);
     if (!options_.enable_motion) say_what_would_be_sent(time_s);
-    if (images_.take_second_sender()) arm_.report(Blocked::second_camera);
     if (topics_.name_is_in_use()) {
       say(time_s, "end: " + name_in_use(run_.rig));
       return false;
@@ -108,13 +112,14 @@ class ArmWatcher : public RunWatcher {
   const RunConfig& run_;
   Supervisor& arm_;
   const CrtkRobot& robot_;
+  const ArmPose* endoscope_;  // its arm, where it moves
   LiveImages& images_;
   LoopTopics& topics_;
   ChangingGoal& goal_;
   double next_counts_s_ = 0, next_set_point_s_ = 0;
   std::string said_counts_;
   std::set<std::string> said_remarks_;
-  bool said_ended_ = false;
+  bool said_ended_ = false, two_endoscopes_ = false;
   std::size_t said_motions_ = 0;
 };
 
@@ -207,10 +212,11 @@ int steer_arm(const ServoOptions& options) {
   }
   if (const std::string not_granted = robot.not_granted(); options.enable_motion && !not_granted.empty())
     std::printf("setpoints leave without %s, see docs/ros.md\n", not_granted.c_str());
-  auto folder = run_folder(options, duration_s(options), rig, config.controller);
+  auto folder = run_folder(options, duration_s(options), rig, controller_of(config));
 
   ChangingGoal goal(trajectory, config);
-  ArmWatcher watcher(options, std::move(folder), arm, its_page, config, robot, images, topics, goal);
+  ArmWatcher watcher(options, std::move(folder), arm, its_page, config, robot,
+                     endoscope_arm ? &*endoscope_arm : nullptr, images, topics, goal);
   if (ended_by_page()) return end_by_page();
   request_real_time(loop_priority);  // the robot has said what is not granted
   lapservo::run(arm, images, clock, config, goal.trajectory(), duration_s(options), watcher);

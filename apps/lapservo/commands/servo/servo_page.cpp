@@ -74,7 +74,8 @@ std::optional<TipGoal> ServoPage::tip_goal() {
   const auto ideal_px = rig_->camera.ideal_from_raw(wanted->at_px);
   if (!ideal_px) throw InputError("tip_goal", "lies where the lens shows nothing");
   if (!depth_m) throw InputError("tip_goal", "needs the tip's depth, and that image does not show it");
-  return TipGoal{first_from_camera * Eigen::Vector3d(*depth_m * rig_->camera.ray_from_ideal(*ideal_px))};
+  const Rigid3 now_from_camera = shown_.front().first_from_camera.inverse() * first_from_camera;
+  return TipGoal{now_from_camera * Eigen::Vector3d(*depth_m * rig_->camera.ray_from_ideal(*ideal_px))};
 }
 
 void ServoPage::answer(double time_s, const std::string& words) {
@@ -84,7 +85,7 @@ void ServoPage::answer(double time_s, const std::string& words) {
 bool ServoPage::command(Supervisor& arm, double now_s) {
   const PageWishes wishes = web_.wishes();
   if (wishes.tip) tip_ = wishes.tip;
-  if (wishes.hold) *wishes.hold ? arm.stop(Commander::page) : arm.start(Commander::page, now_s);
+  if (wishes.hold) *wishes.hold ? arm.stop(Commander::page) : arm.start(Commander::page, now_s - wishes.start_age_s);
   return wishes.stop;
 }
 
