@@ -168,6 +168,7 @@ ImageMessage bgr8_message(const cv::Mat& bgr, double stamp_s) {
   message.height = static_cast<std::uint32_t>(bgr.rows);
   message.step = 3 * message.width;
   message.encoding = "bgr8";
+  message.frame = camera_frame;
   const cv::Mat whole = bgr.isContinuous() ? bgr : bgr.clone();
   message.data.assign(whole.data, whole.data + whole.total() * whole.elemSize());
   return message;

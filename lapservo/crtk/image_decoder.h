@@ -23,7 +23,7 @@ DecodedImage decode(ImageMessage message);
 /// The same of a compressed one: JPEG, PNG or what else decode_image() reads, whole and undamaged.
 DecodedImage decode(const CompressedImageMessage& message);
 
-/// The message of an 8-bit BGR image.
+/// The message of an 8-bit BGR image, in camera_frame.
 ImageMessage bgr8_message(const cv::Mat& bgr, double stamp_s);
 
 }  // namespace lapservo::internal

@@ -71,6 +71,9 @@ inline BoolMessage first_button(const JoyMessage& message) {
   return {!message.buttons.empty() && message.buttons.front() == 1};
 }
 
+/// The camera's frame in what is published, where nobody names another.
+inline constexpr const char* camera_frame = "endoscope";
+
 /// sensor_msgs/Image.
 struct ImageMessage {
   double stamp_s = 0;
@@ -79,6 +82,7 @@ struct ImageMessage {
   bool is_bigendian = false;
   std::vector<std::uint8_t> data;
   std::uint64_t source = 0;  ///< as in JointMessage
+  std::string frame{};       ///< written, not read
 };
 
 /// sensor_msgs/CompressedImage.
@@ -87,6 +91,7 @@ struct CompressedImageMessage {
   std::string format;
   std::vector<std::uint8_t> data;
   std::uint64_t source = 0;  ///< as in JointMessage
+  std::string frame{};       ///< written, not read
 };
 
 /// sensor_msgs/CameraInfo of a camera with plumb_bob distortion, not rectified.
@@ -95,6 +100,7 @@ struct CameraInfoMessage {
   std::uint32_t width = 0, height = 0;
   std::vector<double> d;      ///< k1 k2 p1 p2 k3
   std::array<double, 9> k{};  ///< row by row
+  std::string frame{};
 };
 
 /// geometry_msgs/PoseWithCovarianceStamped: position, then the rotation's vector, in the frame's axes.

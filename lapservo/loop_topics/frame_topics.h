@@ -13,7 +13,7 @@ namespace lapservo::internal {
 
 /// Names of the frames in /tf; NAME in them stands for the instrument's.
 struct FrameNames {
-  std::string camera = "endoscope", rcm = "NAME_rcm", marker = "NAME_marker", shaft = "NAME_shaft", tip = "NAME_tip";
+  std::string camera = camera_frame, rcm = "NAME_rcm", marker = "NAME_marker", shaft = "NAME_shaft", tip = "NAME_tip";
 };
 
 /// Where instruments are. At once and when it changes, /tf_static has the RCM frame in the camera frame; of every

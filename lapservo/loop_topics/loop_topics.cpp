@@ -52,22 +52,35 @@ std::string topic(const Rig& rig, const std::string& name) {
   return "/lapservo/" + rig.instruments.front().name + "/" + name;
 }
 
-// Nothing for what makes no sense, and for one of more than an hour or ten thousand points, which takes too long to
-// check.
-std::optional<Trajectory> trajectory_of(const TrajectoryMessage& message) {
+// Throws InputError for what makes no sense.
+Eigen::Vector4d features_of(const JointMessage& message) {
+  const auto is_finite = [](double value) { return std::isfinite(value); };
+  if (message.names != feature_names() || message.positions.size() != FeatureVector::size ||
+      !std::all_of(message.positions.begin(), message.positions.end(), is_finite))
+    throw InputError("set_point", "expected four finite positions named s_rad, r_px, l_px, d_px");
+  return Eigen::Vector4d(message.positions.data());
+}
+
+// Throws InputError for what makes no sense, and for one of more than an hour or ten thousand points, which takes too
+// long to check.
+Trajectory trajectory_of(const TrajectoryMessage& message) {
   constexpr double longest_s = 3600;
   constexpr std::size_t most = 10000;
   const std::vector<std::string> places{"x_m", "y_m", "z_m"}, turned_places{"x_m", "y_m", "z_m", "roll_rad"};
   const bool turns = message.names == turned_places, of_tip = turns || message.names == places;
-  if ((!of_tip && message.names != feature_names()) || message.points.empty() || message.points.size() > most ||
-      !(message.points.front().time_s >= 0) || !(message.points.back().time_s <= longest_s))
-    return std::nullopt;
+  if (!of_tip && message.names != feature_names())
+    throw InputError("trajectory", "expected the names s_rad, r_px, l_px, d_px, or x_m, y_m, z_m with roll_rad or not");
+  if (message.points.empty() || message.points.size() > most || !(message.points.front().time_s >= 0) ||
+      !(message.points.back().time_s <= longest_s))
+    throw InputError("trajectory", fmt::format("expected 2 to {} points between 0 and {} s", most, longest_s));
   std::vector<double> times_s;
   std::vector<Eigen::Vector4d> features;
   std::vector<TipGoal> tips;
   for (const TrajectoryMessage::Point& point : message.points) {
     const std::vector<double>& values = point.positions;
-    if (values.size() != message.names.size()) return std::nullopt;
+    if (values.size() != message.names.size())
+      throw InputError("trajectory", fmt::format("a point has {} positions, expected one for each of {} names",
+                                                 values.size(), message.names.size()));
     times_s.push_back(point.time_s);
     if (of_tip) {
       tips.push_back({Eigen::Vector3d(values.data()), turns ? std::optional(values[3]) : std::nullopt});
@@ -75,12 +88,8 @@ std::optional<Trajectory> trajectory_of(const TrajectoryMessage& message) {
       features.emplace_back(values.data());
     }
   }
-  try {
-    return of_tip ? tip_trajectory_through(std::move(times_s), tips, "trajectory")
-                  : trajectory_through(std::move(times_s), std::move(features), "trajectory");
-  } catch (const InputError&) {
-    return std::nullopt;
-  }
+  return of_tip ? tip_trajectory_through(std::move(times_s), tips, "trajectory")
+                : trajectory_through(std::move(times_s), std::move(features), "trajectory");
 }
 
 // Throws InputError for what is no pose.
@@ -212,7 +221,6 @@ void LoopTopics::hear(const StringMessage& command) {
   if (words == "start" || words == "start force") return hear_start(command, words != "start");
   wishes_.stops.insert(command.source);
   if (words == "stop") return;
-  ++malformed_;
   remark(
       fmt::format("stopped by the unknown command '{}': expected start, start force or stop", printable(command.text)));
 }
@@ -221,8 +229,20 @@ void LoopTopics::remark(const std::string& text) {
   if (wishes_.remarks.size() < most_remarks) wishes_.remarks.insert(text);
 }
 
-void LoopTopics::want_instead() {
+// The last of all goals counts.
+template <typename Make, typename Goal>
+void LoopTopics::want(const Make& make, std::optional<Goal> LoopWishes::*wish) {
+  std::optional<Goal> goal;
+  std::string refusal;
+  try {
+    goal = make();
+  } catch (const InputError& error) {
+    refusal = std::string("refused: ") + error.what();
+  }
+  const std::lock_guard lock(mutex_);
+  if (!goal) return remark(refusal);
   wishes_.set_point.reset(), wishes_.tip_goal.reset(), wishes_.trajectory.reset();
+  wishes_.*wish = std::move(goal);
 }
 
 void LoopTopics::hear_start(const StringMessage& command, bool force) {
@@ -241,40 +261,16 @@ bool LoopTopics::name_is_in_use() const {
   return SteadyClock().now_s() - other_loop_s_ < lasts_s;
 }
 
-void LoopTopics::hear(const JointMessage& set_point) {
-  const bool whole = set_point.names == feature_names() && set_point.positions.size() == 4 &&
-                     std::all_of(set_point.positions.begin(), set_point.positions.end(),
-                                 [](double value) { return std::isfinite(value); });
-  const std::lock_guard lock(mutex_);
-  if (whole) {
-    want_instead();
-    wishes_.set_point = Eigen::Vector4d(set_point.positions.data());
-  } else {
-    ++malformed_;
-  }
+void LoopTopics::hear(const JointMessage& message) {
+  want([&] { return features_of(message); }, &LoopWishes::set_point);
 }
 
 void LoopTopics::hear(const PlaceMessage& message) {
-  const std::lock_guard lock(mutex_);
-  try {
-    const TipGoal goal = tip_goal_of(message);
-    want_instead();
-    wishes_.tip_goal = goal;
-  } catch (const InputError& error) {
-    ++malformed_;
-    remark(std::string("refused: ") + error.what());
-  }
+  want([&] { return tip_goal_of(message); }, &LoopWishes::tip_goal);
 }
 
 void LoopTopics::hear(const TrajectoryMessage& message) {
-  const auto trajectory = trajectory_of(message);
-  const std::lock_guard lock(mutex_);
-  if (trajectory) {
-    want_instead();
-    wishes_.trajectory = trajectory;
-  } else {
-    ++malformed_;
-  }
+  want([&] { return trajectory_of(message); }, &LoopWishes::trajectory);
 }
 
 LoopWishes LoopTopics::wishes() {
@@ -282,15 +278,11 @@ LoopWishes LoopTopics::wishes() {
   return std::exchange(wishes_, {});
 }
 
-long LoopTopics::malformed() const {
-  const std::lock_guard lock(mutex_);
-  return malformed_;
-}
-
 void LoopTopics::draw() {
   while (const auto drawing = to_draw_.pop()) {
     CompressedImageMessage message;
     message.stamp_s = drawing->stamp_s;
+    message.frame = frames_.camera();
     message.format = "bgr8; jpeg compressed bgr8";
     Rig rig = rig_;
     rig.instruments.front().camera_from_rcm = drawing->camera_from_rcm;

@@ -54,9 +54,8 @@ class LoopTopics {
   void publish(const ControlTick& tick, const std::string& state);
   /// Whether another loop has published as NAME in the last second: it would obey the same commands.
   bool name_is_in_use() const;
-  /// Messages since the last call. Invalid messages are dropped and counted.
+  /// Messages since the last call. Goals that are none are dropped, with a remark.
   LoopWishes wishes();
-  long malformed() const;
 
  private:
   void publish_numbers(const ControlTick& tick, double stamp_s);
@@ -67,7 +66,8 @@ class LoopTopics {
   void hear(const JointMessage& set_point);
   void hear(const PlaceMessage& tip_goal);
   void hear(const TrajectoryMessage& trajectory);
-  void want_instead();
+  template <typename Make, typename Goal>
+  void want(const Make& make, std::optional<Goal> LoopWishes::*wish);
   void remark(const std::string& text);
   void draw();
 
@@ -90,7 +90,6 @@ class LoopTopics {
 
   mutable std::mutex mutex_;
   LoopWishes wishes_;
-  long malformed_ = 0;
   std::array<double, 2> started_s_;  ///< when start, and start force, came last
   double other_loop_s_;              ///< when another one of this name published last
   BoundedQueue<Drawing> to_draw_{1};

@@ -33,6 +33,7 @@ std::vector<std::string> joined(const std::array<std::string, 4>& shaft, const s
 
 CameraInfoMessage info_of(const Camera& camera, double stamp_s) {
   CameraInfoMessage message;
+  message.frame = camera_frame;
   message.stamp_s = stamp_s;
   message.width = static_cast<std::uint32_t>(camera.width_px);
   message.height = static_cast<std::uint32_t>(camera.height_px);
@@ -159,7 +160,7 @@ void SimRobot::compress() {
   while (auto image = to_compress_.pop()) {
     const cv::Mat bgr(static_cast<int>(image->height), static_cast<int>(image->width), CV_8UC3, image->data.data(),
                       image->step);
-    compressed_({image->stamp_s, "bgr8; jpeg compressed bgr8", encode_jpeg(bgr, quality)});
+    compressed_({image->stamp_s, "bgr8; jpeg compressed bgr8", encode_jpeg(bgr, quality), 0, image->frame});
   }
 }
 

@@ -138,8 +138,9 @@ TEST(Ros1Messages, TellOfTheLoop) {
   EXPECT_EQ(seen_wire.feature_covariance[15], 6);
   EXPECT_EQ(seen_wire.error[3], 7);
 
-  const CameraInfoMessage camera{stamp_s, 640, 360, {1, 2, 3, 4, 5}, {550, 0, 319.5, 0, 551, 179.5, 0, 0, 1}};
+  const CameraInfoMessage camera{stamp_s, 640, 360, {1, 2, 3, 4, 5}, {550, 0, 319.5, 0, 551, 179.5, 0, 0, 1}, "e"};
   const auto camera_wire = ros1_message(camera);
+  EXPECT_EQ(camera_wire.header.frame_id, "e");
   EXPECT_EQ(camera_wire.distortion_model, "plumb_bob");
   EXPECT_EQ(camera_wire.D.at(4), 5);
   EXPECT_EQ(camera_wire.K[4], 551);

@@ -79,6 +79,7 @@ ros1::StringStamped ros1_message(const StringMessage& message) {
 
 ros1::Image ros1_message(const ImageMessage& message) {
   auto wire = with_stamp<ros1::Image>(message.stamp_s);
+  wire.header.frame_id = message.frame;
   wire.height = message.height;
   wire.width = message.width;
   wire.encoding = message.encoding;
@@ -90,6 +91,7 @@ ros1::Image ros1_message(const ImageMessage& message) {
 
 ros1::CompressedImage ros1_message(const CompressedImageMessage& message) {
   auto wire = with_stamp<ros1::CompressedImage>(message.stamp_s);
+  wire.header.frame_id = message.frame;
   wire.format = message.format;
   wire.data.assign(message.data.begin(), message.data.end());
   return wire;
@@ -97,6 +99,7 @@ ros1::CompressedImage ros1_message(const CompressedImageMessage& message) {
 
 ros1::CameraInfo ros1_message(const CameraInfoMessage& message) {
   auto wire = with_stamp<ros1::CameraInfo>(message.stamp_s);
+  wire.header.frame_id = message.frame;
   wire.height = message.height;
   wire.width = message.width;
   wire.distortion_model = "plumb_bob";

@@ -156,6 +156,7 @@ BoolMessage Wire<BoolMessage>::read(const Type& wire) {
 
 void Wire<ImageMessage>::write(dds_entity_t writer, const ImageMessage& message) {
   auto wire = with_header<Type>(message.stamp_s);
+  wire.header_.frame_id_ = pointer(message.frame);
   wire.height_ = message.height;
   wire.width_ = message.width;
   wire.encoding_ = pointer(message.encoding);
@@ -179,6 +180,7 @@ ImageMessage Wire<ImageMessage>::read(const Type& wire) {
 
 void Wire<CompressedImageMessage>::write(dds_entity_t writer, const CompressedImageMessage& message) {
   auto wire = with_header<Type>(message.stamp_s);
+  wire.header_.frame_id_ = pointer(message.frame);
   wire.format_ = pointer(message.format);
   point(wire.data_, message.data);
   dds_write(writer, &wire);
@@ -190,6 +192,7 @@ CompressedImageMessage Wire<CompressedImageMessage>::read(const Type& wire) {
 
 void Wire<CameraInfoMessage>::write(dds_entity_t writer, const CameraInfoMessage& message) {
   auto wire = with_header<Type>(message.stamp_s);
+  wire.header_.frame_id_ = pointer(message.frame);
   static char model[] = "plumb_bob";
   wire.height_ = message.height;
   wire.width_ = message.width;

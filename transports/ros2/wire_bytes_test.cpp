@@ -159,14 +159,16 @@ TEST(WireBytes, OfWhatSteersAnArm) {
 
 TEST(WireBytes, OfPictures) {
   const Fields image =
-      sent_as("sensor_msgs/Image", ImageMessage{stamp_s, 2, 1, 7, "rgb8", true, {1, 2, 3, 4, 5, 6, 255}});
+      sent_as("sensor_msgs/Image", ImageMessage{stamp_s, 2, 1, 7, "rgb8", true, {1, 2, 3, 4, 5, 6, 255}, 0, "e"});
   expect_fields(image, stamp);
+  expect_fields(image, "header.frame_id e");
   expect_fields(image, "height 1, width 2, encoding rgb8, is_bigendian 1, step 7, data 7 of them, data[6] 255");
-  expect_fields(sent_as("sensor_msgs/CompressedImage", CompressedImageMessage{stamp_s, "jpeg", {7, 8}}),
-                "format jpeg, data 2 of them, data[1] 8");
-  const CameraInfoMessage camera{stamp_s, 640, 360, {1, 2, 3, 4, 5}, {550, 0, 319.5, 0, 551, 179.5, 0, 0, 1}};
+  expect_fields(sent_as("sensor_msgs/CompressedImage", CompressedImageMessage{stamp_s, "jpeg", {7, 8}, 0, "e"}),
+                "header.frame_id e, format jpeg, data 2 of them, data[1] 8");
+  const CameraInfoMessage camera{stamp_s, 640, 360, {1, 2, 3, 4, 5}, {550, 0, 319.5, 0, 551, 179.5, 0, 0, 1}, "e"};
   expect_fields(sent_as("sensor_msgs/CameraInfo", camera),
-                "height 360, width 640, distortion_model plumb_bob, d 5 of them, d[4] 5, k[4] 551, r[0] 1, r[1] 0, "
+                "header.frame_id e, height 360, width 640, distortion_model plumb_bob, d 5 of them, d[4] 5, k[4] 551, "
+                "r[0] 1, r[1] 0, "
                 "p[6] 179.5, p[3] 0, binning_x 0, roi.do_rectify false");
 }
 
