@@ -410,6 +410,7 @@ TEST_F(CommandLine, ServoRefusesWhatCanNotBe) {
   expect_refused(servo + " --robot sim --set-point 0.9,795,365,900", {"--set-point", "can't be followed at 0.00 s"});
   expect_refused(servo + " --robot sim --set-point 0.9,795", {"--set-point"});
   expect_refused(servo + " --robot sim --via 1,2,3", {"--via", "four"});
+  expect_refused(servo + " --robot sim --set-point 0.9,795,365,212 --tip 0,0,0.1", {"--tip", "beside --set-point"});
   expect_refused(servo + " --robot sim --method fast", {"--method", "fast", "uncalibrated"});
   expect_refused(servo + " --robot sim --tracker magic", {"--tracker", "magic"});
   expect_refused(servo + " --robot sim --delay-ms soon", {"--delay-ms", "soon"});

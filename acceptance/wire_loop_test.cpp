@@ -732,7 +732,7 @@ TEST_P(WireLoop, SurvivesWhenEitherSideIsKilledOrStopped) {
 }
 
 TEST_P(FirstWireLoop, InterruptedItBringsTheArmToRestAndSaysWhatItCameTo) {
-  for (const int signal : {SIGINT, SIGTERM}) {
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
     begin();
     ASSERT_TRUE(moves());
     end(signal);

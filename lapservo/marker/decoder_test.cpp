@@ -11,6 +11,7 @@
 #include <tuple>
 #include <vector>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "lapservo/core/angles.h"
@@ -232,7 +233,10 @@ TEST(MarkerProblem, NamesTheFirstFieldThatMakesNoMarker) {
   expect_problem(&Marker::bands_lower_m, Three{0.0095, 0.0095, 0.006},
                  "bands_lower_m: is a sum of 0.025000, expected the same sum as bands_upper_m (0.024000): both ends of "
                  "the marker are circles");
-  expect_problem(&Marker::seam_rad, nan, "seam_rad: is nan, expected an angle in radians");
+  for (const double seam_rad : {nan, 90.0})
+    expect_problem(
+        &Marker::seam_rad, seam_rad,
+        fmt::format("seam_rad: is {}, expected radians, at most a turn: larger numbers look like degrees", seam_rad));
   expect_problem(&Marker::gap_rad, -0.1, "gap_rad: ");
   expect_problem(&Marker::wrap_m, nan, "wrap_m: ");
   good.skew_m = 1e-3;

@@ -111,7 +111,8 @@ std::optional<FieldProblem> marker_problem(const Marker& marker) {
                                                  "): both ends of the marker are circles"
                                            : "that of bands_upper_m and skew_m (" +
                                                  std::to_string(marker.length_m() + marker.skew_m) + ")"};
-  if (!(std::abs(marker.seam_rad) <= 100)) return problem("seam_rad", marker.seam_rad, "an angle in radians");
+  if (!(std::abs(marker.seam_rad) <= two_pi))
+    return problem("seam_rad", marker.seam_rad, "radians, at most a turn: larger numbers look like degrees");
   return std::nullopt;
 }
 

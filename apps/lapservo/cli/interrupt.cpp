@@ -17,8 +17,8 @@ void on_signal(int number) {
 }  // namespace
 
 void watch_for_interrupts() {
-  std::signal(SIGINT, on_signal);
-  std::signal(SIGTERM, on_signal);
+  for (const int number : {SIGINT, SIGTERM, SIGHUP})
+    if (std::signal(number, on_signal) == SIG_IGN && number == SIGHUP) std::signal(SIGHUP, SIG_IGN);  // nohup
 }
 
 bool interrupted() {

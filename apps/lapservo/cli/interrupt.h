@@ -4,7 +4,8 @@
 
 namespace lapservo::app {
 
-/// From now on Ctrl-C (and SIGTERM) lets the running job end well; a second one ends it at once.
+/// From now on Ctrl-C, SIGTERM and SIGHUP (a terminal that is closed) let the running job end well; a second one ends
+/// it at once.
 void watch_for_interrupts();
 bool interrupted();
 

@@ -11,6 +11,8 @@
 
 #include <opencv2/core/utils/logger.hpp>
 
+#include "apps/lapservo/cli/interrupt.h"
+
 namespace lapservo::app {
 namespace {
 
@@ -48,7 +50,7 @@ int run_program(int argc, char** argv, const std::vector<AddSubcommand>& subcomm
     return bad_input;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "lapservo: %s\n", error.what());
-    return bad_input;
+    return interrupted() ? 1 : bad_input;
   }
 }
 

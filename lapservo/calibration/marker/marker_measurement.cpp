@@ -59,7 +59,9 @@ void expect_registration(const Instrument& instrument, const std::string& rig, c
   for (const auto& [there, key] : {std::pair{instrument.camera_from_rcm.has_value(), "camera_from_rcm"},
                                    {instrument.joints.has_value(), "joints"}})
     if (!there)
-      throw InputError(rig, fmt::format("{} needs {} of {}, which the rig lacks", joints_option, key, instrument.name));
+      throw InputError(
+          rig, fmt::format("{} needs {} of {}, which the rig lacks: leave it out, or calibrate registration before",
+                           joints_option, key, instrument.name));
 }
 
 std::vector<CalibratedNumber> calibrated_numbers(const Marker& before, const Marker& after, bool with_seam) {

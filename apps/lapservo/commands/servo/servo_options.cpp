@@ -106,10 +106,20 @@ TipGoal tip_of(const std::vector<double>& numbers) {
   return {Eigen::Vector3d(numbers.data()), numbers.size() == 4 ? std::optional(numbers[3]) : std::nullopt};
 }
 
+// The one option that has the goal, "--trajectory paper" where none was given.
+std::string goal_option(const ServoOptions& options) {
+  std::vector<std::string> given;
+  if (!options.set_point.empty()) given.emplace_back("--set-point");
+  if (!options.tip.empty()) given.emplace_back("--tip");
+  if (!options.via.empty()) given.emplace_back("--via");
+  if (options.trajectory != "paper" || given.empty()) given.emplace_back("--trajectory");
+  if (given.size() > 1) throw InputError(given[1], "is a second goal beside " + given[0] + ", expected one");
+  return given[0];
+}
+
 std::string trajectory_name(const ServoOptions& options) {
-  if (!options.set_point.empty()) return "--set-point";
-  if (!options.tip.empty()) return "--tip";
-  return options.via.empty() ? options.trajectory : "--via";
+  const std::string goal = goal_option(options);
+  return goal == "--trajectory" ? options.trajectory : goal;
 }
 
 }  // namespace
@@ -138,9 +148,10 @@ const Instrument& arm_of(const ServoOptions& options, const Rig& rig) {
 }
 
 Trajectory trajectory_of(const ServoOptions& options) {
-  if (!options.set_point.empty()) return set_point(four(options.set_point));
-  if (!options.tip.empty()) return tip_set_point(tip_of(options.tip), "--tip");
-  if (!options.via.empty()) return via_points(points_of(options.via), via_rate, via_dwell_s);
+  const std::string goal = goal_option(options);
+  if (goal == "--set-point") return set_point(four(options.set_point));
+  if (goal == "--tip") return tip_set_point(tip_of(options.tip), "--tip");
+  if (goal == "--via") return via_points(points_of(options.via), via_rate, via_dwell_s);
   if (options.trajectory == "paper") return sinusoids(paper_sinusoids());
   return trajectory_from_csv(options.trajectory);
 }
