@@ -182,8 +182,10 @@ std::unique_ptr<FrameSource> open_frame_source(const std::string& input, double 
                                                const VideoReading& reading) {
   using Kind = FrameSource::Kind;
   if (input.find("://") != std::string::npos) return std::make_unique<StreamSource>(input, reading);
-  std::error_code error;  // of a name that no file can have, or a folder that may not be looked into
-  if (!fs::exists(input, error))
+  std::error_code error;
+  const bool exists = fs::exists(input, error);
+  if (error == std::errc::permission_denied) throw InputError(input, "can't be looked at: " + error.message());
+  if (!exists)  // or a name that no file can have
     throw InputError(input, "does not exist, expected an image, a folder of images or a video");
   if (fs::is_directory(input)) return std::make_unique<PictureSource>(Kind::folder, pictures_in(input), folder_fps);
   if (fs::is_regular_file(input) && fs::file_size(input) == 0)

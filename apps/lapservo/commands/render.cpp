@@ -127,6 +127,10 @@ Exposure exposure_of(const Rig& rig, const std::vector<Configurations>& frames, 
 }
 
 int run(const RenderArguments& options) {
+  if (options.moving && !options.poses.empty())
+    throw InputError("--moving", "is a path through random configurations, expected none with --poses");
+  if (options.video && options.format != "png")
+    throw InputError("--format", "is " + options.format + ", expected none with --video");
   const Rig rig = load_rig(options.rig);
   for (const Instrument& instrument : rig.instruments)
     if (!instrument.camera_from_rcm)

@@ -1,8 +1,10 @@
 #include "lapservo/io/tables/configuration_csv.h"
 
+#include <cmath>
 #include <cstddef>
 #include <string>
 
+#include "lapservo/core/angles.h"
 #include "lapservo/core/error.h"
 #include "lapservo/rig/instrument_index.h"
 
@@ -32,8 +34,15 @@ std::vector<Configurations> configurations_from(const CsvTable& table, const Rig
       throw InputError(source, "instrument", rig.instruments[index].name + " twice in frame " + std::to_string(frame),
                        "every instrument once a frame");
     named_in[index] = frame;
-    frames[frame][index] = {table.number(row, "theta_rad"), table.number(row, "phi_rad"), table.number(row, "rho_m"),
-                            table.number(row, "psi_rad")};
+    const auto within = [&](const char* column, double most, const char* expected) {
+      const double value = table.number(row, column);
+      if (!(std::abs(value) <= most)) throw InputError(source, column, table.text(row, column), expected);
+      return value;
+    };
+    constexpr auto radians = "radians: it looks like degrees";
+    frames[frame][index] = {within("theta_rad", two_pi, radians), within("phi_rad", two_pi, radians),
+                            within("rho_m", 1, "metres: it looks like millimetres"),
+                            within("psi_rad", 2 * two_pi, radians)};
   }
   return frames;
 }

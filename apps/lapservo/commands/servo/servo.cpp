@@ -171,6 +171,11 @@ int run(const ServoOptions& options) {
   if (options.rig.empty())
     throw InputError("--rig", "is missing, expected a rig's YAML, for example configs/paper.yaml");
   if (recorded) return decide_on_recording(options);
+  if (options.robot == "sim" && !options.camera.empty())
+    throw InputError("--camera",
+                     "is " + options.camera + ", which the simulator does not read, expected none with sim");
+  if (!options.hide.empty() && !(options.hide[0] < options.hide[1]))
+    throw InputError("--hide", "expected from,to in seconds, the later one last");
   if (options.robot == "sim") return simulate(options);
   if (options.robot.find(':') != std::string::npos) return steer_arm(options);
   constexpr auto expected = ", expected sim, ros2:NAMESPACE or ros1:NAMESPACE";
