@@ -113,31 +113,26 @@ TEST_F(Outputs, NeverGoOverInputs) {
     return all;
   };
   const std::string before = snapshot();
-  for (const char* arguments : {"track frames --rig rig.yaml --out rig.yaml",
-                                "track frames --rig rig.yaml --out ./hard.yaml",
-                                "track frames --rig rig.yaml --out cam.yaml",
-                                "track frames --out frames/rig.yaml",
-                                "track frames --out frames/0000.rig.yaml",
-                                "track frames --out frames/cam.yaml",
-                                "track frames --out soft.png",
-                                "track frames/0001.png --out frames/rig.yaml",
-                                "track frames --overlay frames/",
-                                "track frames --overlay mixed",
-                                "track frames/0001.png --overlay soft.png",
-                                "track frames/0001.png --overlay mixed",
-                                "estimate-rcm obs.csv --out obs.csv",
-                                "estimate-rcm obs.csv --rig rig.yaml --out cam.yaml",
-                                "marker show --rig rig.yaml --out cam.yaml",
-                                "marker print --rig rig.yaml --out hard.yaml",
-                                "render --rig frames/rig.yaml --out frames --force",
-                                "render --rig rig.yaml --out . --force",
-                                "render --rig rig.yaml --background frames/0000.png --out frames --force",
-                                "experiment rcm --rig rig.yaml --out . --force"})
+  for (const char* arguments :
+       {"track frames --rig rig.yaml --out rig.yaml", "track frames --rig rig.yaml --out ./hard.yaml",
+        "track frames --rig rig.yaml --out cam.yaml", "track frames --out frames/rig.yaml",
+        "track frames --out frames/0000.rig.yaml", "track frames --out frames/cam.yaml", "track frames --out soft.png",
+        "track frames --overlay frames/", "track frames --overlay mixed", "track frames/0001.png --overlay soft.png",
+        "track frames/0001.png --overlay mixed", "estimate-rcm obs.csv --out obs.csv",
+        "estimate-rcm obs.csv --rig rig.yaml --out cam.yaml", "marker show --rig rig.yaml --out cam.yaml",
+        "marker print --rig rig.yaml --out hard.yaml", "render --rig frames/rig.yaml --out frames --force",
+        "render --rig rig.yaml --out . --force",
+        "render --rig rig.yaml --background frames/0000.png --out frames --force",
+        "experiment rcm --rig rig.yaml --out . --force"})
     expect_refused(arguments, {"input"});
   for (const char* arguments :
        {"track frames --out same --overlay ./same", "align frames --rig rig.yaml --out same --report ./same",
         "calibrate registration frames --rig rig.yaml --out same --base-frame same"})
     expect_refused(arguments, {"two results"});
+  for (const char* arguments : {"track frames/0001.png --out frames/rig.yaml", "track frames --out new.mp4",
+                                "check frames --rig rig.yaml --out new.csv"})
+    expect_refused(arguments, {"one that ends in"});
+  expect_refused("marker design --diameter-mm 8.4 --distance-mm 100 --out rig.yaml", {"is a rig", "marker"});
   EXPECT_EQ(snapshot(), before);
 }
 

@@ -3,6 +3,7 @@
 #include <cerrno>
 #include <fcntl.h>
 #include <unistd.h>
+#include <utility>
 
 #include "lapservo/core/error.h"
 
@@ -82,6 +83,10 @@ void RowFile::commit() {
   if (part_.empty()) return;
   put_in_place(target_, file_.number(), part_);
   part_.clear();
+}
+
+fs::path RowFile::leave() {
+  return part_.empty() ? target_.name : std::exchange(part_, {});
 }
 
 }  // namespace lapservo::internal

@@ -24,6 +24,8 @@ class RowFile {
   /// A row or several, each without its line's end. Throws InputError when it can't be written.
   void add(std::string_view row);
   void commit();
+  /// Ends it unfinished: the earlier PATH stays, and PATH.part with the rows so far. Returns where they are.
+  std::filesystem::path leave();
 
  private:
   void open_part();

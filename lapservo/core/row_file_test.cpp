@@ -39,6 +39,16 @@ TEST(RowFile, LeavesAloneWhatIsNotItsOwnUnfinishedTable) {
   EXPECT_EQ(said(), refusal);
 }
 
+TEST(RowFile, LeftUnfinishedItReplacesNothing) {
+  const TemporaryFolder folder;
+  testing::write_file(folder / "o.csv", "earlier");
+  RowFile file(folder / "o.csv", "a,b");
+  file.add("1,2");
+  EXPECT_EQ(file.leave(), folder / "o.csv.part");
+  EXPECT_EQ(read_file(folder / "o.csv"), "earlier");
+  EXPECT_EQ(read_file(folder / "o.csv.part"), "a,b\n1,2\n");
+}
+
 TEST(RowFile, TwoRunsDoNotShareAFile) {
   const TemporaryFolder folder;
   RowFile first(folder / "o.csv", "a,b");

@@ -144,6 +144,7 @@ int run(const EstimateRcmOptions& options) {
   inputs.add(options.observations);
   if (rig) inputs.add_rig(options.rig, *rig);
   inputs.refuse_as_output(options.out);
+  refuse_other_kind(options.out, ".csv");
   std::optional<AtomicFile> report;
   if (!options.out.empty()) report.emplace(options.out);
   const std::vector<RcmResult> results = estimate_all(options, rig);

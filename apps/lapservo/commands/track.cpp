@@ -241,6 +241,7 @@ class TrackRun {
     if (names_topic(options.joints)) live_wrist_.emplace(options.joints);
     if (!options.publish.empty()) publishing_.emplace(options);
     if (options.web.port) web_.emplace(options.web, page_config_of(options, source_));
+    refuse_other_kind(options.out, ".csv");
     if (!options.page_only) csv_.emplace(options.out);
     if (!options.overlay.empty()) overlay_ = open_overlay_writer(options.overlay, source_);
   }
@@ -256,6 +257,8 @@ class TrackRun {
       web_->end();
       wait_on_page(*web_, [] { return false; });
     }
+    // A camera has no end but this.
+    if (stopped_ && source_.kind() != FrameSource::Kind::live) return leave_unfinished();
     if (csv_) csv_->commit();
     if (overlay_) overlay_->commit();
     tell_results();
@@ -263,6 +266,12 @@ class TrackRun {
   }
 
  private:
+  int leave_unfinished() {
+    std::fprintf(stderr, "lapservo: %s: stopped after %d frames%s%s\n", options_.input.c_str(), tally_.frames,
+                 csv_ ? "; their observations: " : "", csv_ ? csv_->leave().c_str() : "");
+    return 1;
+  }
+
   // On a page alone, at the speed of the recording.
   bool plays_a_file() const { return options_.page_only && source_.kind() != FrameSource::Kind::live; }
 
@@ -422,7 +431,7 @@ void add_track(Command app, Run& run_later) {
   add_input_options(command, *options);
   command.add_option("--out", options->out,
                      "CSV of observations, replacing one of that name when all is measured; until then, and if the run "
-                     "is killed, the rows are in NAME.part, which the next run of that name writes over");
+                     "is stopped, the rows are in NAME.part, which the next run of that name writes over");
   command.add_option(
       "--overlay", options->overlay,
       "Write images (a folder) or a video (.mp4) with the detection drawn in, replacing those of the same name");

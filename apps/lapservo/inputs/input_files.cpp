@@ -30,6 +30,24 @@ void refuse_shared_place(const std::vector<fs::path>& places) {
       throw InputError(place.string(), "is the place for two results, expected a place for each");
 }
 
+void refuse_other_kind(const fs::path& result, const std::string& ending) {
+  static const std::set<std::string> kinds{".csv", ".yaml", ".yml", ".html", ".json", ".mp4",  ".avi", ".mkv",
+                                           ".mov", ".png",  ".jpg", ".bag",  ".db3",  ".mcap", ".pdf", ".svg"};
+  const std::string own = result.extension() == ".yml" ? ".yaml" : result.extension().string();
+  if (own != ending && kinds.contains(own))
+    throw InputError(result.string(), "name", own, "one that ends in " + ending);
+}
+
+void refuse_over_rig(const fs::path& result, const std::string& part) {
+  try {
+    if (!identity_of(result)) return;
+    load_rig(result);
+  } catch (const InputError&) {
+    return;
+  }
+  throw InputError(result.string(), "is a rig, which its " + part + " alone would replace: expected another name");
+}
+
 void InputFiles::add(const fs::path& path) {
   if (const auto identity = identity_of(path)) files_.emplace(*identity, path);
 }

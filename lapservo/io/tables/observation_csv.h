@@ -32,6 +32,8 @@ class ObservationCsv {
   void add(int frame, double time_s, const std::string& file, const Observation& observation);
   /// Throws InputError when it could not be written to its end.
   void commit() { file_.commit(); }
+  /// See RowFile.
+  std::filesystem::path leave() { return file_.leave(); }
 
  private:
   RowFile file_;

@@ -37,6 +37,10 @@ void check_files(const CalibrateCameraOptions& options, const std::optional<Rig>
   }
   for (const std::string& place : {options.rig_out(), options.camera_info}) files.refuse_as_output(place);
   refuse_shared_place({options.rig_out(), options.camera_info});
+  for (const std::string& place : {options.camera_info, rig ? std::string() : options.out}) {
+    refuse_other_kind(place, ".yaml");
+    refuse_over_rig(place, "camera");
+  }
   if (!rig) return;
   files.add_rig(options.rig, *rig);
   files.refuse_as_output(options.camera_info);

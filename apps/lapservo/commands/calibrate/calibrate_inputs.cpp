@@ -70,6 +70,8 @@ void refuse_outputs_over_inputs(const CalibrateOptions& options, const Rig& rig)
     if (fs::is_directory(input, error)) inputs.add_pictures_in(input);
   for (const std::string& out : {options.out, options.report, options.dvrk.base_frame}) inputs.refuse_as_output(out);
   refuse_shared_place({options.out, options.report, options.dvrk.base_frame});
+  refuse_other_kind(options.out, ".yaml"), refuse_other_kind(options.report, ".html");
+  refuse_other_kind(options.dvrk.base_frame, ".json");
   inputs.add_rig(options.rig, rig);
   inputs.refuse_as_output(options.report);
   inputs.refuse_as_output(options.dvrk.base_frame);
