@@ -1,10 +1,8 @@
 #include "lapservo/vision/surface_tracker.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 
-#include "lapservo/core/angles.h"
 #include "lapservo/marker/azimuths.h"
 #include "lapservo/vision/colour/blob_search.h"
 #include "lapservo/vision/decision/fit_observation.h"
@@ -57,6 +55,19 @@ Scene SurfaceTracker::scene_of(const ImageView& image, std::size_t i) const {
   scene.max_p_false = max_p_false_;
   scene.registration = registrations_[i] ? &*registrations_[i] : nullptr;
   return scene;
+}
+
+// What the frame showed; whether it, or one shortly before it, shows two moments of an instrument.
+bool SurfaceTracker::remember(const ImageView& image) {
+  for (std::size_t i = 0; i < rig_.instruments.size(); ++i) {
+    const std::optional<FineFit>& fit = found_[i].fit;
+    const auto before = seen_before_[i];
+    seen_before_[i] = {fit ? fit->unknowns.pose() : found_[i].refused, before[0]};
+    if (!fit) continue;
+    memory_[i] = remembered(memory_[i], *fit, found_[i].among_others, now_s_);
+    if (shows_two_moments(scene_of(image, i), *fit, before)) blended_s_ = now_s_;
+  }
+  return blended_s_ && now_s_ - *blended_s_ < two_moments_limits.told_for_s;
 }
 
 // This frame's evidence about the print.
@@ -161,8 +172,8 @@ bool SurfaceTracker::look_for_lost(const ImageView& image, const LightImage& lig
 void SurfaceTracker::find(const ImageView& image, const LightImage& light, WorkBudget& budget) {
   for (ShaftCover& cover : covers_) cover.clear();
   bool lost = followed_twice_ = followed_in_vain_ = false;
+  std::fill(found_.begin(), found_.end(), Found{});  // in all, before one is followed beside the others
   for (std::size_t i = 0; i < rig_.instruments.size(); ++i) {
-    found_[i] = {};
     if (memory_[i]) found_[i] = follow_known(image, light, i, budget);
     lost |= !found_[i].fit;
     followed_in_vain_ |= memory_[i] && !found_[i].fit;
@@ -184,19 +195,15 @@ const std::vector<Observation>& SurfaceTracker::track(const cv::Mat& image_bgr, 
   for (PrintRecord& print : prints_) print.begin_frame(now_s_);
   WorkBudget budget(single_ ? std::nullopt : frame_budget_);
   find(image, light, budget);
+  const bool is_blended = remember(image);
   for (std::size_t i = 0; i < rig_.instruments.size(); ++i) {
-    Found& found = found_[i];
-    learn_print(i);
+    const Found& found = found_[i];
+    if (!is_blended) learn_print(i);
     observations_[i] = {};
     observations_[i].status = found.status;
     if (found.refused) observations_[i] = refused_observation(found.status, *found.refused);
-    const auto before = seen_before_[i];
-    seen_before_[i] = {found.fit ? found.fit->unknowns.pose() : found.refused, before[0]};
     if (!found.fit) continue;
     const FineFit& fit = *found.fit;
-    memory_[i] = remembered(memory_[i], fit, found.among_others, now_s_);
-    if (shows_two_moments(scene_of(image, i), fit, before)) blended_s_ = now_s_;
-    const bool is_blended = blended_s_ && now_s_ - *blended_s_ < two_moments_limits.told_for_s;
     if (!rig_.instruments[i].marker.bands_are_measured() && prints_[i].is_off())
       observations_[i] = refused_observation(Status::marker_mismatch, fit.unknowns.pose());
     else if (is_blended)

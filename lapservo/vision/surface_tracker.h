@@ -48,6 +48,7 @@ class SurfaceTracker {
   bool cover_expected(std::size_t instrument, WorkBudget& budget);
   void cover_found(std::size_t instrument, const std::vector<Blob>& blobs, WorkBudget& budget);
   void cover(std::size_t instrument, const ShaftPose& pose, WorkBudget& budget);
+  bool remember(const ImageView& image);
   void learn_print(std::size_t instrument);
   Scene scene_of(const ImageView& image, std::size_t instrument) const;
 

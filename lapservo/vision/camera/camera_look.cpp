@@ -1,7 +1,5 @@
 #include "lapservo/vision/camera/camera_look.h"
 
-#include <optional>
-
 namespace lapservo::internal {
 namespace {
 

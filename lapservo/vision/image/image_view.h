@@ -17,7 +17,6 @@ struct ImageView {
       : data(bgr.data), row_bytes(static_cast<std::ptrdiff_t>(bgr.step[0])), width_px(bgr.cols), height_px(bgr.rows) {}
 
   const std::uint8_t* pixel(int u, int v) const { return data + v * row_bytes + 3 * static_cast<std::ptrdiff_t>(u); }
-  bool contains(int u, int v) const { return u >= 0 && v >= 0 && u < width_px && v < height_px; }
 };
 
 }  // namespace lapservo::internal

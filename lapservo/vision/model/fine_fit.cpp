@@ -7,7 +7,6 @@
 #include <span>
 #include <utility>
 
-#include "lapservo/core/angles.h"
 #include "lapservo/vision/camera/camera_look.h"
 #include "lapservo/vision/model/common_errors.h"
 #include "lapservo/vision/model/normal_equations.h"
@@ -173,7 +172,7 @@ bool Fitter::is_blurred_otherwise(const Expected& expected) const {
 }
 
 bool Fitter::see_camera(const Expected& expected) {
-  fit_.asked = expected.ask || is_blurred_otherwise(expected);
+  fit_.asked = fit_.asked || expected.ask || is_blurred_otherwise(expected);  // also after other passes
   for (int i = 0; fit_.asked; ++i) {
     SeenCamera camera = look_at_camera(light_, pass_.all, located_with_.boundaries_px(), fit_.departure);
     fit_.processing = camera.evidence.processing;
@@ -221,9 +220,8 @@ void Fitter::judge(const Expected& expected) {
 // The part of sigma by a turn within the exposure.
 void Fitter::count_turn(const Expected& expected) {
   const TurnBlur turn = turn_blur(pass_, located_with_, fit_.processing == Processing::found);
-  const auto change_rad = expected.moved_on
-                              ? std::optional(wrap_pi(expected.moved_on->change_to(fit_.unknowns)[psi_unknown]))
-                              : std::nullopt;
+  const auto change_rad =
+      expected.moved_on ? std::optional(expected.moved_on->change_to(fit_.unknowns)[psi_unknown]) : std::nullopt;
   fit_.covariance(psi_unknown, psi_unknown) += variance_of_uneven_turn(turn, change_rad);
   fit_.p_false = std::max(fit_.p_false, p_false_of(0, fit_.psi_variance_rad2()));
 }

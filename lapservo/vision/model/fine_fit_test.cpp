@@ -48,7 +48,7 @@ void expect_honest(bool rcm) {
     const PoseUnknowns truth = shot.truth(rcm);
     const FineFit fit = fit_from(shot, truth.changed_by(random_offset(random)));
     ASSERT_TRUE(fit.converged);
-    const double psi_error_rad = wrap_pi(truth.change_to(fit.unknowns)[psi_unknown]);
+    const double psi_error_rad = truth.change_to(fit.unknowns)[psi_unknown];
     const double square = normalised_square(shot, fit, truth);
     EXPECT_LT(std::abs(psi_error_rad), 6e-3);
     if (seed <= bounded) {

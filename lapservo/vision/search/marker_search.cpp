@@ -4,7 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include "lapservo/core/angles.h"
 #include "lapservo/vision/decision/displaced_boundary.h"
 #include "lapservo/vision/decision/verification.h"
 #include "lapservo/vision/search/coarse_fit.h"
@@ -66,7 +65,7 @@ Found try_start(const Scene& scene, const LightImage& light, const PoseUnknowns&
 
 // Two fits of one marker that are both ok: of what blood leaves both can't be sure.
 bool are_rivals(const FineFit& fit, const FineFit& other) {
-  return std::abs(wrap_pi(fit.unknowns.change_to(other.unknowns)[psi_unknown])) > Observation::false_rad;
+  return std::abs(fit.unknowns.change_to(other.unknowns)[psi_unknown]) > Observation::false_rad;
 }
 
 // No marker moves farther from frame to frame.

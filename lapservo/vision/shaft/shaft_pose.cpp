@@ -59,7 +59,7 @@ PoseVector PoseUnknowns::change_to(const PoseUnknowns& other) const {
   PoseVector step;
   step << std::atan2(-axis.y(), axis.z()), std::asin(std::clamp(axis.x(), -1.0, 1.0)),
       axes_.transpose() * (to.translation - from.translation),
-      other.pose_.psi_rad - pose_.psi_rad + roll_between_rad(from.rotation, to.rotation);
+      wrap_pi(other.pose_.psi_rad - pose_.psi_rad + roll_between_rad(from.rotation, to.rotation));
   return step;
 }
 
