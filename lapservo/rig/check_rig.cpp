@@ -3,8 +3,6 @@
 #include <cmath>
 #include <string>
 
-#include "lapservo/core/error.h"
-
 namespace lapservo::internal {
 namespace {
 
@@ -22,11 +20,27 @@ void check_camera(const Camera& camera) {
 
 }  // namespace
 
+std::optional<FieldProblem> hues_problem(const Marker& marker, const Instrument& other) {
+  if (same_colour_order(marker, other.marker))
+    return FieldProblem{"hues_deg", "the order of " + other.name,
+                        "another order of colours: it is what names the instrument"};
+  if (reversed_colour_order(marker, other.marker))
+    return FieldProblem{"hues_deg", "the order of " + other.name + " reversed",
+                        "another middle colour: turned end for end, the two look the same"};
+  return std::nullopt;
+}
+
 void check_rig(const Rig& rig) {
   check_camera(rig.camera);
-  if (rig.instruments.empty()) throw InputError("rig", "instruments", "none", "one and more");
-  for (const Instrument& instrument : rig.instruments) {
+  const std::size_t count = rig.instruments.size();
+  if (count == 0 || count > most_instruments)
+    throw InputError("rig", "instruments", std::to_string(count), "one to eight");
+  for (std::size_t i = 0; i < count; ++i) {
+    const Instrument& instrument = rig.instruments[i];
     const std::string where = instrument.name + ".";
+    for (std::size_t j = 0; j < i; ++j)
+      if (const auto problem = hues_problem(instrument.marker, rig.instruments[j]))
+        throw InputError("rig", where + "marker." + problem->field, problem->value, problem->expectation);
     if (const auto problem = marker_problem(instrument.marker))
       throw InputError("rig", where + "marker." + problem->field, problem->value, problem->expectation);
     const auto& transform = instrument.camera_from_rcm;

@@ -19,6 +19,7 @@
 #include "lapservo/geometry/invertible.h"
 #include "lapservo/marker/decoder.h"
 #include "lapservo/rig/camera_formats.h"
+#include "lapservo/rig/check_rig.h"
 #include "lapservo/rig/covariance_field.h"
 #include "lapservo/rig/response_field.h"
 #include "lapservo/rig/tool_field.h"
@@ -276,12 +277,8 @@ void check_distinguishable(const std::vector<Instrument>& instruments, const std
     for (std::size_t j = 0; j < i; ++j) {
       if (instruments[i].name == instruments[j].name)
         fields[i]["name"].fail(instruments[i].name, "a name that no other instrument has");
-      if (same_colour_order(instruments[i].marker, instruments[j].marker))
-        fields[i]["marker"]["hues_deg"].fail("the order of " + instruments[j].name,
-                                             "another order of colours: it is what names the instrument");
-      if (reversed_colour_order(instruments[i].marker, instruments[j].marker))
-        fields[i]["marker"]["hues_deg"].fail("the order of " + instruments[j].name + " reversed",
-                                             "another middle colour: turned end for end, the two look the same");
+      if (const auto problem = hues_problem(instruments[i].marker, instruments[j]))
+        fields[i]["marker"]["hues_deg"].fail(problem->value, problem->expectation);
     }
 }
 
@@ -293,7 +290,7 @@ Rig parse_root(const YamlField& root, const fs::path& folder) {
   if (camera.is_scalar()) rig.camera_file = folder / camera.text("a path");
   const YamlField list = root["instruments"];
   const auto fields = list.list("a list of instruments");
-  if (fields.empty() || fields.size() > 8) list.fail(list.value_text(), "one to eight instruments");
+  if (fields.empty() || fields.size() > most_instruments) list.fail(list.value_text(), "one to eight instruments");
   for (const YamlField& field : fields) rig.instruments.push_back(parse_instrument(field, folder));
   check_distinguishable(rig.instruments, fields);
   return rig;

@@ -388,6 +388,7 @@ TEST(Rig, WithWhichNothingCanBeSeenIsRefused) {
   expect_refused([](Rig& rig) { rig.camera.distortion[4] = none; });
   expect_refused([](Rig& rig) { rig.instruments.clear(); });
   expect_refused([](Rig& rig) { rig.instruments[0].marker.diameter_m = -1; });
+  expect_refused([](Rig& rig) { rig.instruments.push_back(rig.instruments[0]); });
   expect_refused([](Rig& rig) { rig.instruments[0].camera_from_rcm->translation.x() = none; });
 }
 
