@@ -336,7 +336,10 @@ CameraCalibration calibrate_camera(const Board& board, const std::vector<BoardVi
   constexpr int last_round = 1;
   for (int round = 0; round <= last_round; ++round) {
     told("edges in green");
-    adjustment = adjust_camera(fit->camera, fit->camera_from_board, measured(board, views, *fit, false, false).points,
+    const auto points = measured(board, views, *fit, false, false).points;
+    if (std::all_of(points.begin(), points.end(), [](const auto& view) { return view.empty(); }))
+      return refuse("no edge between squares can be measured: they are overexposed, or narrower than some 14 px");
+    adjustment = adjust_camera(fit->camera, fit->camera_from_board, points,
                                {.k3 = false, .faults = round == last_round}, at_iteration);
     if (!adjustment) return refuse("the views are too alike to determine the camera");
     fit = fit_of(*adjustment);

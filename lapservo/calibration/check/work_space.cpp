@@ -96,10 +96,10 @@ std::optional<double> sigma_at(Judge& judge, const Rigid3& shaft) {
   return sigmas_rad[turns / 2] < not_found ? std::optional(sigmas_rad[turns / 2]) : std::nullopt;
 }
 
-// Near and far of where the marker was, where it was measured.
-std::vector<double> depths_of(const std::vector<TimedPose>& poses) {
+// Near and far of where the marker's middle was, where it was measured.
+std::vector<double> depths_of(const std::vector<TimedPose>& poses, double length_m) {
   std::vector<double> depths_m;
-  for (const TimedPose& pose : poses) depths_m.push_back(pose.origin().z());
+  for (const TimedPose& pose : poses) depths_m.push_back((pose.origin() + length_m / 2 * pose.axis()).z());
   std::sort(depths_m.begin(), depths_m.end());
   const std::size_t tenth = depths_m.size() / 10;
   return {depths_m[tenth], depths_m[depths_m.size() - 1 - tenth]};
@@ -151,7 +151,8 @@ WorkSpaceSurvey survey_work_space(const Rig& rig, std::size_t instrument, const 
   WorkSpaceSurvey survey;
   const auto measured = measured_sigmas(evidence, rig.instruments[instrument].marker);
   if (measured.empty()) return survey;
-  survey.maps = sigma_maps(rig, instrument, depths_of(evidence.poses()), measured);
+  survey.maps =
+      sigma_maps(rig, instrument, depths_of(evidence.poses(), rig.instruments[instrument].marker.length_m()), measured);
   WorkSpace work_space;
   int good = 0;
   for (const SigmaMap& map : survey.maps) {

@@ -20,7 +20,6 @@ namespace {
 
 constexpr int sectors = 60;
 constexpr std::size_t max_per_sector = 2;
-constexpr double max_time_s = 1e9;
 
 constexpr std::size_t min_edges = 40, min_turn_frames = 12, min_seam_views = 3;
 constexpr double widest_unseen_rad = 0.9;  // between neighbouring facing azimuths; a view measures +-0.9 rad
@@ -245,7 +244,7 @@ bool is_settled(const Adjustment& adjustment, double radius_m) {
 }
 
 // A sentence for each kind, the clearest first.
-std::vector<std::string> texts_of(const std::vector<PrintFault>& faults) {
+std::vector<std::string> texts_of(const std::vector<PrintFault>& faults, double first_s) {
   std::vector<std::string> texts;
   std::optional<PrintFault::Kind> told;
   for (const PrintFault& fault : faults) {
@@ -257,7 +256,7 @@ std::vector<std::string> texts_of(const std::vector<PrintFault>& faults) {
                       ? "the print slips by %.3f mm about %.0f s after the start: fasten it and "
                         "record again"
                       : "a boundary of the print bows by %.3f mm between its ends: print and cut it straight",
-                  1e3 * std::abs(fault.size), fault.from_s);
+                  1e3 * std::abs(fault.size), fault.from_s - first_s);
     texts.emplace_back(text);
   }
   return texts;
@@ -314,7 +313,7 @@ bool KeyFrames::add(const cv::Mat& bgr, double time_s) {
   const Marker& marker = rig_.instruments[instrument_].marker;
   auto view = cropped_view(bgr, rig_.camera, marker, sighting->unknowns.pose().camera_from_unrolled);
   if (!view) return true;
-  KeyFrame frame{std::move(*view), *sighting, std::min(time_s, max_time_s), turned_rad};
+  KeyFrame frame{std::move(*view), *sighting, time_s, turned_rad};
   if (worst == sector.end())
     sector.push_back(std::move(frame));
   else
@@ -335,6 +334,8 @@ MarkerCalibration calibrate_marker(const Rig& rig, std::size_t instrument, std::
                                    const std::function<void(int, int)>& progress, const AtIteration& at_iteration) {
   const Marker nominal = rig.instruments[instrument].marker;
   if (const std::string why = refusal_of(frames, nominal); !why.empty()) return refused(why);
+  double first_s = frames.front().time_s;
+  for (const KeyFrame& frame : frames) first_s = std::min(first_s, frame.time_s);
   const std::string unsolvable = "the frames contradict one another: is it one marker, and the rig's camera?";
   TurnFit fit(rig, instrument, std::move(frames), at_iteration);
   MarkerCalibration calibration;
@@ -379,7 +380,7 @@ MarkerCalibration calibrate_marker(const Rig& rig, std::size_t instrument, std::
         "without glare");
   if (!settled) return refused("the fit does not settle: more frames, sharper ones, or a rig nearer to the print");
   calibration.after_px = summary_of(*last, fit.measured(), fit.marker(), 2).rms_px;
-  calibration.faults = texts_of(last->faults);
+  calibration.faults = texts_of(last->faults, first_s);
   calibration.marker = fit.marker();
   calibration.marker.sigmas = sigmas_of(*last->covariance, nominal.sigmas);
   if (no_gap_sigma_rad) calibration.marker.sigmas.gap_rad = no_gap_sigma_rad;
