@@ -80,10 +80,7 @@ py::dict result_of(std::optional<GivenRig> measured, const Camera& camera, const
   py::dict result("yaml"_a = measured ? rig_yaml(measured->rig, measured->path) : camera_yaml(camera),
                   "numbers"_a = rows, "complaint"_a = complaint, "faults"_a = py::list(), "rig"_a = py::none());
   if (!measured) return result;
-  // Absolute: who saves it may stand in another folder by then.
-  fs::path& camera_file = measured->rig.camera_file;
-  if (!camera_file.empty()) camera_file = fs::absolute(camera_file);
-  result["rig"] = py::cast(measured->rig);
+  result["rig"] = py::cast(with_absolute_files(std::move(measured->rig)));
   return result;
 }
 

@@ -13,9 +13,13 @@
 #include <opencv2/core.hpp>
 
 #include "lapservo/geometry/rigid3.h"
+#include "lapservo/rig/rig.h"
 
 namespace lapservo::python {
 namespace py = pybind11;
+
+/// With the files that it names by absolute paths: who uses it may stand in another folder by then.
+Rig with_absolute_files(Rig rig);
 
 /// An image as numpy has it: uint8[H, W, 3], blue green red.
 using Image = py::array_t<std::uint8_t>;

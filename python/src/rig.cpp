@@ -187,7 +187,8 @@ q = sign * joints + offset, rad and m.)");
       .def("__repr__", [](const Instrument& instrument) { return "<lapservo.Instrument '" + instrument.name + "'>"; });
 }
 
-// Who uses it may stand in another folder by then.
+}  // namespace
+
 Rig with_absolute_files(Rig rig) {
   if (!rig.camera_file.empty()) rig.camera_file = std::filesystem::absolute(rig.camera_file);
   for (Instrument& instrument : rig.instruments)
@@ -195,8 +196,6 @@ Rig with_absolute_files(Rig rig) {
       instrument.tool->file = std::filesystem::absolute(instrument.tool->file);
   return rig;
 }
-
-}  // namespace
 
 void bind_rig(py::module_& m) {
   bind_camera(m);

@@ -76,6 +76,9 @@ class Ros2ImagePublisher : private Node {
       : Node("lapservo_images"), publisher_(transport.image_publisher(topic)) {}
 
   void publish(const cv::Mat& bgr, const std::optional<double>& time_s) {
+    constexpr double last_s = 2147483647;  // a stamp's
+    if (time_s && !(*time_s >= 0 && *time_s <= last_s))
+      throw InputError("Ros2ImagePublisher.publish", "time_s", fmt::format("{}", *time_s), "seconds since 1970");
     publisher_(bgr8_message(bgr, time_s.value_or(transport.stamp_now_s())));
   }
 
@@ -85,6 +88,7 @@ class Ros2ImagePublisher : private Node {
 
 // Until the arm's joints are known, so that run() knows where a trajectory begins.
 void wait_for_joints(Ros2Robot& robot, const std::string& arm, double wait_s) {
+  if (!(wait_s >= 0)) throw InputError("Ros2Robot", "wait_s", fmt::format("{}", wait_s), "0 or more seconds");
   const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(wait_s);
   while (!(robot.state().time_s > 0)) {
     if (PyErr_CheckSignals() != 0) throw py::error_already_set();

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <string>
 #include <vector>
@@ -24,6 +25,7 @@ void point(Sequence& sequence, const std::vector<T>& values) {
 template <typename Time = builtin_interfaces_msg_dds__Time_>
 Time time_of(double stamp_s) {
   Time time{};
+  if (!(stamp_s >= 0 && stamp_s <= std::numeric_limits<std::int32_t>::max())) return time;
   const double whole = std::floor(stamp_s);
   time.sec_ = static_cast<std::int32_t>(whole);
   time.nanosec_ = static_cast<std::uint32_t>(std::min(std::round((stamp_s - whole) * 1e9), 999999999.0));
