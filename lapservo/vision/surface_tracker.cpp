@@ -57,7 +57,7 @@ Scene SurfaceTracker::scene_of(const ImageView& image, std::size_t i) const {
   return scene;
 }
 
-// What the frame showed; whether it, or one shortly before it, shows two moments of an instrument.
+// Takes in the frame; says whether it, or one shortly before it, shows two moments of an instrument.
 bool SurfaceTracker::remember(const ImageView& image) {
   for (std::size_t i = 0; i < rig_.instruments.size(); ++i) {
     const std::optional<FineFit>& fit = found_[i].fit;
