@@ -5,7 +5,6 @@
 #include <map>
 #include <utility>
 
-#include "lapservo/control/motion_limits.h"
 #include "lapservo/core/printable.h"
 #include "lapservo/crtk/joint_map.h"
 #include "lapservo/tool/wrist.h"

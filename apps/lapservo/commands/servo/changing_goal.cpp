@@ -49,8 +49,9 @@ std::optional<std::string> ChangingGoal::result(const ServoDecision& decision, d
 void ChangingGoal::check_next(const ControlTick& tick) {
   const ServoDecision& decision = tick.decision;
   const bool being_measured = run_.rig.instruments.front().camera_from_rcm && !decision.camera_from_rcm;
+  if (!wanted_ || refusal_.valid() || being_measured) return;
   const auto first_from_camera = run_.endoscope ? run_.endoscope->first_from_camera(tick.input.time_s) : Rigid3();
-  if (!wanted_ || refusal_.valid() || being_measured || !first_from_camera) return;
+  if (!first_from_camera) return;
   std::optional<Rigid3> camera_from_rcm = decision.camera_from_rcm;
   if (camera_from_rcm) camera_from_rcm = first_from_camera->inverse() * *camera_from_rcm;
   asked_ = *std::exchange(wanted_, std::nullopt);
