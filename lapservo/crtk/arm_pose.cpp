@@ -10,7 +10,7 @@
 namespace lapservo::internal {
 namespace {
 
-constexpr double late_s = 0.07, silence_s = 0.5, memory_s = 3, by_motion_of_s = 0.05, ahead_s = 0.1;
+constexpr double late_s = 0.07, memory_s = 3, by_motion_of_s = 0.05, ahead_s = 0.1;
 
 // From one pose on to another by that share of the way, which may be above 1.
 Rigid3 between(const Rigid3& from, const Rigid3& to, double share) {
@@ -40,13 +40,10 @@ void ArmPose::take(const PlaceMessage& message, bool local) {
   if (local_ && !local) return;
   const bool other_topic = local && !local_;
   local_ = local;
-  if (!other_topic && source_.value_or(message.source) != message.source && arrival_s - heard_s_ <= silence_s) {
-    second_s_ = arrival_s;
-    return poses_.clear();
-  }
-  if (other_topic || source_ != message.source) stamps_ = StampClock(late_s), poses_.clear();
-  source_ = message.source, heard_s_ = arrival_s;
-  if (arrival_s - second_s_ <= silence_s) return;
+  if (other_topic) sender_ = {};
+  const FirstSender::Verdict verdict = sender_.hear(message.source, arrival_s);
+  if (other_topic || verdict == FirstSender::Verdict::counts_anew) stamps_ = StampClock(late_s), poses_.clear();
+  if (sender_.has_rival(arrival_s)) return poses_.clear();
   const StampClock::Reading reading = stamps_.read(message.stamp_s, arrival_s);
   if (reading.verdict != StampVerdict::fresh || (!poses_.empty() && reading.time_s <= poses_.back().time_s)) return;
   poses_.push_back({reading.time_s, {rotation.normalized(), translation}});
@@ -55,7 +52,7 @@ void ArmPose::take(const PlaceMessage& message, bool local) {
 
 bool ArmPose::has_two_senders() const {
   const std::lock_guard lock(mutex_);
-  return clock_.now_s() - second_s_ <= silence_s;
+  return sender_.has_rival(clock_.now_s());
 }
 
 std::optional<Rigid3> ArmPose::newest() const {

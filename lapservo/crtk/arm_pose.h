@@ -1,12 +1,12 @@
 #pragma once
 
-#include <cstdint>
 #include <deque>
 #include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "lapservo/crtk/first_sender.h"
 #include "lapservo/crtk/stamp_clock.h"
 #include "lapservo/crtk/transport.h"
 #include "lapservo/robot/clock.h"
@@ -41,9 +41,7 @@ class ArmPose {
   StampClock stamps_;
   std::deque<Pose> poses_;
   bool local_ = false;
-  std::optional<std::uint64_t> source_;                 ///< whose poses count
-  double heard_s_ = 0;                                  ///< when it was heard last
-  double second_s_ = -1e9;                              ///< when another one was
+  FirstSender sender_;
   std::vector<Transport::Subscription> subscriptions_;  // last: they use the others
 };
 

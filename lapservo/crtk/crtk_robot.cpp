@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "lapservo/robot/real_time.h"
+#include "lapservo/robot/suspension_watch.h"
 
 namespace lapservo::internal {
 namespace {
@@ -171,14 +172,12 @@ void CrtkRobot::command() {
   const auto period =
       std::chrono::duration_cast<std::chrono::steady_clock::duration>(std::chrono::duration<double>(period_s_));
   auto next = std::chrono::steady_clock::now();
-  double suspended_s = clock_.suspended_s();
+  SuspensionWatch suspension(clock_);
   while (!ended_) {
     JointMessage message;
     {
-      constexpr double plain_s = 0.05;  // two clocks are not read at the same time
       const std::lock_guard lock(mutex_);
-      const double before_s = std::exchange(suspended_s, clock_.suspended_s());
-      if (suspended_s - before_s > plain_s) interlock_.on_suspended(clock_.now_s());
+      if (suspension.was_suspended()) interlock_.on_suspended(clock_.now_s());
       if (auto positions = interlock_.tick(clock_.now_s())) {
         message.names = interlock_.names();
         message.positions = std::move(*positions);

@@ -9,12 +9,6 @@
 #include "lapservo/crtk/image_decoder.h"
 
 namespace lapservo::internal {
-namespace {
-
-constexpr double silence_s = 0.5;  // after which a sender is gone
-
-}  // namespace
-
 std::string ImageCounts::text() const {
   std::string text;
   const auto add = [&](const char* what, long count) {
@@ -52,18 +46,12 @@ void ImageReceiver::take(Image& message, double arrival_s) {
 }
 
 bool ImageReceiver::is_of_first_sender(std::uint64_t source, double arrival_s) {
-  if (sender_ && sender_->source != source && arrival_s - sender_->last_s <= silence_s) {
-    if (!other_s_ || arrival_s - *other_s_ > silence_s) second_sender_ = true;
-    other_s_ = arrival_s;
-    return false;
-  }
-  if (!sender_ || sender_->source != source) {
-    second_sender_ = second_sender_ || sender_;
-    last_stamp_s_.reset();
-    other_s_.reset();
-  }
-  sender_ = Heard{source, arrival_s};
-  return true;
+  const bool had_rival = sender_.has_rival(arrival_s);
+  const FirstSender::Verdict verdict = sender_.hear(source, arrival_s);
+  if (verdict == FirstSender::Verdict::counts_anew) last_stamp_s_.reset();
+  if (verdict == FirstSender::Verdict::counts_anew || (!had_rival && sender_.has_rival(arrival_s)))
+    second_sender_ = true;
+  return verdict != FirstSender::Verdict::other;
 }
 
 bool ImageReceiver::take_second_sender() {

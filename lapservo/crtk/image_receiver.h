@@ -6,6 +6,7 @@
 #include <string>
 #include <variant>
 
+#include "lapservo/crtk/first_sender.h"
 #include "lapservo/crtk/messages.h"
 #include "lapservo/crtk/stamp_clock.h"
 #include "lapservo/stream/image_stream.h"
@@ -73,12 +74,7 @@ class ImageReceiver : public ImageStream {
   std::string complaint_;
   std::optional<Waiting> waiting_;
   std::optional<double> last_stamp_s_, distance_s_;
-  struct Heard {
-    std::uint64_t source = 0;
-    double last_s = 0;
-  };
-  std::optional<Heard> sender_;    // whose images count
-  std::optional<double> other_s_;  // when another one's came last
+  FirstSender sender_;
   bool second_sender_ = false;
 };
 

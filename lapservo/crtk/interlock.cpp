@@ -13,8 +13,8 @@ namespace lapservo::internal {
 namespace {
 
 constexpr std::size_t max_joints = 64;
-constexpr double silence_s = 0.5;  // from a sender's last message on another one may be the arm
-constexpr double memory_s = 1;     // a setpoint that was sent since then is ours, whenever the arm reports it
+constexpr double unwatched_s = 0.5;
+constexpr double memory_s = 1;  // a setpoint that was sent since then is ours, whenever the arm reports it
 // Tolerance for the arm's changes of a setpoint (units, coupling, rounding); beyond it the setpoint is another
 // program's.
 const Eigen::Vector4d same_q(2e-3, 2e-3, 2e-4, 4e-3);
@@ -79,22 +79,19 @@ std::optional<Interlock::Places> Interlock::places_in(const JointMessage& messag
   return places;
 }
 
-// Whether a message is of the topic's first sender or, when nothing has come for a while, of the one after it.
-bool Interlock::is_of(Source& source, std::uint64_t sender, const std::optional<double>& heard_s, double arrival_s) {
-  if (source.value_or(sender) != sender && heard_s && arrival_s - *heard_s <= silence_s) {
-    second_s_ = arrival_s;
-    watch(arrival_s);
-    return false;
+bool Interlock::is_of(FirstSender& sender, std::uint64_t source, double arrival_s) {
+  const FirstSender::Verdict verdict = sender.hear(source, arrival_s);
+  if (verdict == FirstSender::Verdict::other) watch(arrival_s);
+  if (verdict == FirstSender::Verdict::counts_anew) {
+    begin_anew(arrival_s);
+    sender.hear(source, arrival_s);
   }
-  if (source.value_or(sender) != sender) begin_anew(arrival_s);
-  source = sender;
-  return true;
+  return verdict != FirstSender::Verdict::other;
 }
 
 // Another arm, or the same one after its program was started again.
 void Interlock::begin_anew(double arrival_s) {
-  measured_source_.reset(), setpoint_source_.reset(), state_source_.reset();
-  measured_s_.reset(), setpoint_s_.reset();
+  measured_sender_ = {}, setpoint_sender_ = {}, state_sender_ = {};
   measured_.reset(), setpoint_.reset(), operating_state_.reset();
   rest_.reset(), moved_s_.reset();
   sent_.clear();
@@ -122,8 +119,8 @@ Eigen::Vector4d Interlock::q_of(const JointMessage& message, const Places& place
 }
 
 void Interlock::on_measured(const JointMessage& message, double arrival_s) {
-  if (!is_of(measured_source_, message.source, measured_s_, arrival_s)) return;
-  measured_s_ = arrival_s;
+  if (!is_of(measured_sender_, message.source, arrival_s)) return;
+  state_sender_.is_there(arrival_s);  // its messages are rare
   const auto places = places_in(message);
   if (!places) return;
   const auto time_s = stamped(measured_clock_, message, arrival_s);
@@ -139,8 +136,7 @@ void Interlock::on_measured(const JointMessage& message, double arrival_s) {
 }
 
 void Interlock::on_setpoint(const JointMessage& message, double arrival_s) {
-  if (!is_of(setpoint_source_, message.source, setpoint_s_, arrival_s)) return;
-  setpoint_s_ = arrival_s;
+  if (!is_of(setpoint_sender_, message.source, arrival_s)) return;
   const auto places = places_in(message);
   if (!places || !all_finite(message.positions)) return;
   const auto time_s = stamped(setpoint_clock_, message, arrival_s);
@@ -160,8 +156,7 @@ void Interlock::on_setpoint(const JointMessage& message, double arrival_s) {
 }
 
 void Interlock::on_operating_state(const OperatingStateMessage& message, double arrival_s) {
-  if (!is_of(state_source_, message.source, measured_s_, arrival_s))
-    return;  // a rare message: the arm's joints show its presence
+  if (!is_of(state_sender_, message.source, arrival_s)) return;
   operating_state_ = message;
   watch(arrival_s);
 }
@@ -242,7 +237,8 @@ void Interlock::follow(const JointPath& path) {
 
 Blocked Interlock::blocked(double now_s) const {
   if (foreign_s_ && now_s - *foreign_s_ <= config_.max_age_s) return Blocked::foreign_command;
-  if (second_s_ && now_s - *second_s_ <= silence_s) return Blocked::second_source;
+  if (measured_sender_.has_rival(now_s) || setpoint_sender_.has_rival(now_s) || state_sender_.has_rival(now_s))
+    return Blocked::second_source;
   if (config_.motion_enabled && readers_.value_or(1) > config_.max_readers) return Blocked::second_reader;
   if (!finite_) return Blocked::non_finite_joints;
   if (operating_state_) {
@@ -375,7 +371,7 @@ void Interlock::on_suspended(double now_s) {
 
 std::optional<std::vector<double>> Interlock::tick(double now_s) {
   // An arm that nobody watched may be elsewhere: it is not even braked.
-  if (now_s - std::exchange(ticked_s_, now_s).value_or(now_s) > silence_s) on_suspended(now_s);
+  if (now_s - std::exchange(ticked_s_, now_s).value_or(now_s) > unwatched_s) on_suspended(now_s);
   watch(now_s);
   if (path_ && !path_->at(now_s).position.allFinite()) stop(Blocked::non_finite_joints);
   if (phase_ == Phase::braking && !path_) {

@@ -12,6 +12,7 @@
 #include <Eigen/Core>
 
 #include "lapservo/control/controller_config.h"
+#include "lapservo/crtk/first_sender.h"
 #include "lapservo/crtk/messages.h"
 #include "lapservo/crtk/stamp_clock.h"
 #include "lapservo/rig/rig.h"
@@ -112,8 +113,7 @@ class Interlock {
   };
 
   using Places = std::array<std::size_t, 4>;
-  using Source = std::optional<std::uint64_t>;
-  bool is_of(Source& source, std::uint64_t sender, const std::optional<double>& heard_s, double arrival_s);
+  bool is_of(FirstSender& sender, std::uint64_t source, double arrival_s);
   std::optional<Places> places_in(const JointMessage& message);
   std::optional<double> stamped(StampClock& clock, const JointMessage& message, double arrival_s);
   Eigen::Vector4d q_of(const JointMessage& message, const Places& places) const;
@@ -141,8 +141,7 @@ class Interlock {
   InterlockConfig config_;
   InterlockCounts counts_;
   StampClock measured_clock_, setpoint_clock_;
-  Source measured_source_, setpoint_source_, state_source_;
-  std::optional<double> measured_s_, setpoint_s_, second_s_;  // when these, and somebody else as the arm, came last
+  FirstSender measured_sender_, setpoint_sender_, state_sender_;
   std::string complaint_;
   std::optional<Reading> measured_, setpoint_;
   ReadingBuffer readings_;

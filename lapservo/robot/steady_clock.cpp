@@ -18,7 +18,8 @@ double SteadyClock::suspended_s() const {
     clock_gettime(clock, &time);
     return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
   };
-  return seconds(CLOCK_BOOTTIME) - seconds(CLOCK_MONOTONIC);
+  const double boot_s = seconds(CLOCK_BOOTTIME);  // first: a pause before the other clock is read counts as none
+  return boot_s - seconds(CLOCK_MONOTONIC);
 }
 
 void SteadyClock::sleep_until(double time_s) {

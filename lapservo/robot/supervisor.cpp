@@ -44,7 +44,7 @@ std::string names_of(const Commanders& holders) {
 }  // namespace
 
 Supervisor::Supervisor(Robot& robot, const Clock& clock, const SupervisorConfig& config)
-    : robot_(robot), clock_(clock), config_(config), suspended_s_(clock.suspended_s()) {
+    : robot_(robot), clock_(clock), config_(config), suspension_(clock) {
   if (robot.is_simulated()) config_.settle_s = 0;
 }
 
@@ -55,9 +55,7 @@ JointState Supervisor::state() {
   input_.arm = arm_of(state, input_.time_s, config_.max_reading_age_s);
   if (input_.arm == Blocked::none) input_.arm = std::exchange(reported_, Blocked::none);
   input_.follows = state.follows;
-  constexpr double plain_s = 0.05;  // two clocks are not read at the same time
-  const double before_s = std::exchange(suspended_s_, clock_.suspended_s());
-  input_.suspended = suspended_s_ - before_s > plain_s;
+  input_.suspended = suspension_.was_suspended();
   // In the step before, too: the loop begins where the joints were then.
   input_.at_rest = !path_ || path_->at(state_.time_s).velocity.isZero();
   input_.operator_present = !is_present_ || is_present_();

@@ -9,6 +9,7 @@
 #include "lapservo/robot/clock.h"
 #include "lapservo/robot/robot.h"
 #include "lapservo/robot/supervisor_state.h"
+#include "lapservo/robot/suspension_watch.h"
 
 namespace lapservo {
 
@@ -66,7 +67,7 @@ class Supervisor : public Robot {
   std::string loop_reason_;
   Blocked reported_ = Blocked::none;
   std::function<bool()> is_present_;
-  double suspended_s_;  ///< Clock::suspended_s() in the step before
+  internal::SuspensionWatch suspension_;
 };
 
 }  // namespace lapservo
