@@ -7,9 +7,9 @@ import sys
 from pathlib import Path
 
 # folder: lines, chosen numbers
-LIMITS = {"lapservo/vision": (10717, 436)}
+LIMITS = {"lapservo/vision": (10716, 433)}
 TESTS = ["*_test.cpp", "*/test_*.cpp", "*/test_*.h", "lapservo/testing/*", "acceptance/*.cpp", "acceptance/*.h", "fuzz/*.cpp", "fuzz/*.h"]
-MOST_TEST_LINES = 39678
+MOST_TEST_LINES = 39706
 
 NOT_CODE = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\])*"|\'(?:\\.|[^\'\\])\'|^#[^\n]*', re.S | re.M)
 NUMBER = re.compile(r"(?<![\w.])(?:\d[\d']*\.?\d*|\.\d+)(?:[eE][+-]?\d+)?[fFuUlL]*(?![\w.])")

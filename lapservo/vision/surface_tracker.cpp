@@ -23,6 +23,7 @@ SurfaceTracker::SurfaceTracker(const Rig& rig, bool single, std::optional<double
       channels_(rig.camera),
       memory_(rig.instruments.size()),
       prints_(rig.instruments.size()),
+      prints_before_(rig.instruments.size()),
       seen_before_(rig.instruments.size()),
       searches_(rig.instruments.size()),
       searched_beside_(rig.instruments.size()),
@@ -41,6 +42,11 @@ void SurfaceTracker::forget(std::size_t i) {
   seen_before_[i] = {};
   searches_[i] = MarkerSearch();
   searched_beside_[i] = 0;
+}
+
+void SurfaceTracker::disregard_frame(std::size_t i) {
+  forget(i);
+  prints_[i] = prints_before_[i];
 }
 
 void SurfaceTracker::forget() {
@@ -193,6 +199,7 @@ const std::vector<Observation>& SurfaceTracker::track(const cv::Mat& image_bgr, 
   if (single_) forget();
   now_s_ = clock_.next(time_s);
   for (PrintRecord& print : prints_) print.begin_frame(now_s_);
+  prints_before_ = prints_;
   WorkBudget budget(single_ ? std::nullopt : frame_budget_);
   find(image, light, budget);
   const bool is_blended = remember(image);

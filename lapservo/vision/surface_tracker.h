@@ -32,6 +32,8 @@ class SurfaceTracker {
   const std::vector<Observation>& track(const cv::Mat& image_bgr, std::optional<double> time_s = std::nullopt);
   /// Forgets where an instrument was in the frames before.
   void forget(std::size_t instrument);
+  /// The last frame is no evidence about an instrument: forgets it, and the frames before as forget() does.
+  void disregard_frame(std::size_t instrument);
   /// Forgets all of the frames before, what they showed of the prints as well.
   void forget();
   /// Tracker::set_registration().
@@ -63,7 +65,7 @@ class SurfaceTracker {
   double now_s_ = 0;  // of this frame
   std::vector<std::optional<RcmPrior>> registrations_;
   std::vector<std::optional<InstrumentMemory>> memory_;
-  std::vector<PrintRecord> prints_;
+  std::vector<PrintRecord> prints_, prints_before_;                   // this frame's evidence, too, and without it
   std::vector<std::array<std::optional<ShaftPose>, 2>> seen_before_;  // found or refused in the two frames before
   std::optional<double> blended_s_;                                   // when a frame last showed two moments
   std::vector<MarkerSearch> searches_;

@@ -95,7 +95,7 @@ struct Tracker::State {
     for (std::size_t i = 0; i < observations.size(); ++i) {
       if (!is_combed(image, rig.camera, rig.instruments[i].marker, observations[i])) continue;
       observations[i] = refused_as_interlaced(observations[i], method);
-      surface.forget(i);
+      surface.disregard_frame(i);
     }
   }
 
@@ -139,7 +139,7 @@ void Tracker::set_registration(std::size_t instrument, const Rigid3& camera_from
   moved.camera_from_rcm = camera_from_rcm;
   moved.registration_covariance = covariance;
   state_->surface.set_registration(instrument, moved);
-  state_->centerline.set_registration(instrument, camera_from_rcm);
+  state_->centerline.set_registration(instrument, moved);
 }
 
 void Tracker::set_wrist(std::size_t instrument, std::span<const double> wrist_rad) {

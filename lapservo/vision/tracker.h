@@ -41,8 +41,8 @@ struct TrackerOptions {
 };
 
 /// Finds all instruments of a rig in the frames of one camera. Holds what it learnt from the frames before: where they
-/// were, what the camera does to its images, and whether each print is the rig's; the latter until the marker was out
-/// of sight for 2 s, in which the instrument may have been exchanged.
+/// were, what the camera does to its images, and whether each print is the rig's; the latter until no frame has shown
+/// the print for 2 s, in which the instrument may have been exchanged.
 class Tracker {
  public:
   /// Throws InputError for a rig that nothing can be seen with, and for options out of their ranges.

@@ -27,7 +27,7 @@ LineSigma sigma_of(const CentreLine& line, const Scene& scene, const FineFit& fi
     return centre_line(scene.camera, scene.marker, pose.camera_from_unrolled, pose.psi_rad);
   };
   for (int i = 0; i < pose_unknowns; ++i) {
-    double step = 1e-6;
+    double step = derivative_step;
     auto moved = after(i, step);
     // Over the seam the inner boundaries jump.
     if (moved && std::abs(moved->tau_rad - line.tau_rad) > pi) moved = after(i, step = -step);

@@ -15,7 +15,7 @@ struct PrintRecordLimits {
          most_p_false = 1e-4;  ///< the rig's: all boundaries on so many lines, psi so rarely wrong
   /// From one side that is so near, and two that show much of the same (a camera sees 1 rad to either side).
   double near_rad = 0.6, in_view_rad = 1.2;
-  double exchange_s = 2;  ///< out of sight for so long it may have been exchanged for another instrument
+  double exchange_s = 2;                        ///< of which nothing was added for so long may be another instrument's
   int least_off_sides = 3, off_for_others = 2;  ///< and so many times those from which it may be the rig's
 };
 inline constexpr PrintRecordLimits print_record_limits;

@@ -14,6 +14,9 @@ struct BoundaryCourse {
 
 /// How far along the shaft a wide blur moves a boundary: it mixes what lies beside on either side, and more of where
 /// there is more light. To second order of the blur.
-double moved_by_blur_px(const BoundaryCourse& course, const BlurEllipse& blur);
+inline double moved_by_blur_px(const BoundaryCourse& course, const BlurEllipse& blur) {
+  return (course.slope * blur.across_px2 - blur.oblique_px2) * course.light_change_per_px +
+         0.5 * course.curvature_per_px * blur.across_px2;
+}
 
 }  // namespace lapservo::internal

@@ -14,6 +14,8 @@
 #include "lapservo/geometry/rotation.h"
 #include "lapservo/kinematics/centre_line.h"
 #include "lapservo/marker/azimuths.h"
+#include "lapservo/rig/registration_covariance.h"
+#include "lapservo/vision/shaft/rcm_prior.h"
 #include "lapservo/vision/shaft/shaft_pose.h"
 
 namespace lapservo::internal {
@@ -172,16 +174,15 @@ std::optional<Edges> boundaries_on(const MiddleLine& line, const Camera& camera,
 }
 
 // theta, phi and rho from e0 and e3 on the facing generatrix, for a known tau: Gauss-Newton with numeric derivatives.
-std::optional<JointVector> configuration_from(const Camera& camera, const Instrument& instrument, const Edges& edges,
-                                              double tau_rad) {
-  const Rigid3& camera_from_rcm = *instrument.camera_from_rcm;
-  const double depth_m = camera.fx_px * instrument.marker.length_m() / std::max(1.0, (edges[3] - edges[0]).norm());
+std::optional<JointVector> configuration_from(const Camera& camera, const Marker& marker, const Rigid3& camera_from_rcm,
+                                              const Edges& edges, double tau_rad) {
+  const double depth_m = camera.fx_px * marker.length_m() / std::max(1.0, (edges[3] - edges[0]).norm());
   auto start = configuration_through(camera_from_rcm, camera.ray_from_ideal(edges[0]) * depth_m);
   if (!start) return std::nullopt;
   Eigen::Vector3d x(start->theta_rad, start->phi_rad, start->rho_m);
   const auto seen = [&](const Eigen::Vector3d& p) -> std::optional<Eigen::Vector4d> {
     const Rigid3 unrolled = camera_from_rcm * rcm_from_unrolled({p[0], p[1], p[2], 0});
-    const auto line = centre_line(camera, instrument.marker, unrolled, 0);  // the ends don't depend on psi
+    const auto line = centre_line(camera, marker, unrolled, 0);  // the ends don't depend on psi
     if (!line) return std::nullopt;
     return Eigen::Vector4d(line->ideal_px[0].x(), line->ideal_px[0].y(), line->ideal_px[3].x(), line->ideal_px[3].y());
   };
@@ -193,9 +194,9 @@ std::optional<JointVector> configuration_from(const Camera& camera, const Instru
     miss_px = (measured - *at).norm();
     Eigen::Matrix<double, 4, 3> jacobian;
     for (int i = 0; i < 3; ++i) {
-      const auto ahead = seen(x + 1e-6 * Eigen::Vector3d::Unit(i));
+      const auto ahead = seen(x + derivative_step * Eigen::Vector3d::Unit(i));
       if (!ahead) return std::nullopt;
-      jacobian.col(i) = (*ahead - *at) / 1e-6;
+      jacobian.col(i) = (*ahead - *at) / derivative_step;
     }
     Eigen::Matrix3d normal = jacobian.transpose() * jacobian;
     normal.diagonal() *= 1 + 1e-6;
@@ -205,10 +206,9 @@ std::optional<JointVector> configuration_from(const Camera& camera, const Instru
   }
   if (miss_px > 10) return std::nullopt;  // no shaft through the RCM looks like this
   const Rigid3 unrolled = camera_from_rcm * rcm_from_unrolled({x[0], x[1], x[2], 0});
-  const auto line = centre_line(camera, instrument.marker, unrolled, 0);
+  const auto line = centre_line(camera, marker, unrolled, 0);
   if (!line) return std::nullopt;
-  return JointVector{wrap_pi(x[0]), x[1], x[2],
-                     wrap_pi(rotation_rad(instrument.marker, line->facing_azimuth_rad, tau_rad))};
+  return JointVector{wrap_pi(x[0]), x[1], x[2], wrap_pi(rotation_rad(marker, line->facing_azimuth_rad, tau_rad))};
 }
 
 double tau_from(const CrossRatioDecoder& decoder, const Edges& e) {
@@ -271,17 +271,21 @@ std::optional<Observation> observe_edges(const Camera& camera, const Instrument&
     o.camera_from_unrolled = {rotation_between(Eigen::Vector3d::UnitZ(), to - from), from};
     return o;
   }
-  const auto q = configuration_from(camera, instrument, edges, o.tau_rad);
+  const Marker& marker = instrument.marker;
+  const auto q = configuration_from(camera, marker, *camera_from_rcm, edges, o.tau_rad);
   if (!q) return std::nullopt;
   Observation::Rcm rcm{*q, Eigen::Matrix4d::Zero()};
   for (std::size_t k = 0; k < 4; ++k) {
     const Edges changed = moved(edges, k);
-    const auto other = configuration_from(camera, instrument, changed, tau_from(decoder, changed));
+    const auto other = configuration_from(camera, marker, *camera_from_rcm, changed, tau_from(decoder, changed));
     if (!other) return std::nullopt;
-    Eigen::Vector4d change = other->vector() - q->vector();
-    change[3] = wrap_pi(change[3]);
+    const Eigen::Vector4d change = configuration_change(*q, *other);
     rcm.covariance += change * change.transpose();
   }
+  const Eigen::Matrix<double, 4, 6> slopes = by_registration(*camera_from_rcm, *q, [&](const Rigid3& changed) {
+    return configuration_from(camera, marker, changed, edges, o.tau_rad);
+  });
+  rcm.covariance += slopes * registration_covariance(instrument) * slopes.transpose();
   rcm.covariance(3, 3) = std::max(rcm.covariance(3, 3), o.sigma_tau_rad * o.sigma_tau_rad);
   rcm.covariance.diagonal().array() += 1e-12;
   o.rcm = rcm;

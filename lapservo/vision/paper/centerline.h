@@ -13,7 +13,8 @@ namespace lapservo::internal {
 /// Method::centerline: the paper's Algorithm 1, the baseline to compare with. Segmentation in HSV, morphological
 /// opening, the middle line between the shaft's two sides, the colour boundaries where that line crosses them (to the
 /// pixel), their cross-ratio, tau by eq. (18). With camera_from_rcm also theta, phi and rho from e0 and e3, and psi =
-/// gamma - tau - seam. Sigmas propagate an assumed boundary noise of 0.7 px through the same equations.
+/// gamma - tau - seam. Sigmas propagate an assumed boundary noise of 0.7 px and the registration's covariance through
+/// the same equations.
 class CenterlineMethod {
  public:
   explicit CenterlineMethod(const Rig& rig);
@@ -22,7 +23,7 @@ class CenterlineMethod {
   std::vector<Observation> observe(const cv::Mat& image_bgr) const;
 
   /// Tracker::set_registration().
-  void set_registration(std::size_t i, const Rigid3& moved) { rig_.instruments[i].camera_from_rcm = moved; }
+  void set_registration(std::size_t i, const Instrument& moved) { rig_.instruments[i] = moved; }
 
  private:
   Rig rig_;

@@ -1,6 +1,7 @@
 #include "lapservo/vision/paper/centerline.h"
 
 #include <cmath>
+#include <random>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -8,6 +9,7 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/kinematics/features.h"
 #include "lapservo/testing/scenes.h"
+#include "lapservo/vision/shaft/rcm_prior.h"
 
 namespace lapservo::internal {
 namespace {
@@ -43,6 +45,32 @@ TEST(Centerline, FindsTheBoundariesToThePixelAndTauToItsSigma) {
   ASSERT_GE(count, 10);
   EXPECT_LT(std::sqrt(squares / count), 2);
   EXPECT_GT(std::sqrt(squares / count), 0.3);
+}
+
+TEST(Centerline, TellsWhatItsRegistrationIsOffBy) {
+  Eigen::Vector4d squares = Eigen::Vector4d::Zero();
+  int count = 0;
+  for (std::uint64_t seed = 1; seed <= 16; ++seed) {
+    const Shot& shot = usual_shot(seed);
+    if (near_the_seam(shot)) continue;
+    Rig rig = shot.rig;
+    Instrument& instrument = rig.instruments[0];
+    Eigen::Matrix<double, 6, 1> sigma;
+    sigma << 1e-3, 1e-3, 1e-3, 5e-3, 5e-3, 5e-3;
+    instrument.registration_covariance = sigma.cwiseAbs2().asDiagonal();
+    std::mt19937_64 random(seed);
+    std::normal_distribution<double> normal;
+    for (double& off : sigma) off *= normal(random);
+    instrument.camera_from_rcm->translation += sigma.head<3>();
+    instrument.camera_from_rcm->rotation = rotation_by(sigma.tail<3>()) * instrument.camera_from_rcm->rotation;
+    const Observation o = CenterlineMethod(rig).observe(shot.bgr)[0];
+    ASSERT_TRUE(o.rcm) << "seed " << seed;
+    squares += configuration_change(shot.q, o.rcm->q).cwiseAbs2().cwiseQuotient(o.rcm->covariance.diagonal());
+    ++count;
+  }
+  const Eigen::Vector4d off_by_sigma = (squares / count).cwiseSqrt();
+  EXPECT_LT(off_by_sigma.maxCoeff(), 1.6) << off_by_sigma.transpose();
+  EXPECT_GT(off_by_sigma.minCoeff(), 0.4) << off_by_sigma.transpose();
 }
 
 TEST(Centerline, WithoutTheRcmTellsTauAlone) {

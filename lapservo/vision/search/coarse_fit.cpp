@@ -14,7 +14,6 @@
 #include "lapservo/marker/azimuths.h"
 #include "lapservo/vision/colour/colour_evidence.h"
 #include "lapservo/vision/model/normal_equations.h"
-#include "lapservo/vision/search/heaviest_stretch.h"
 #include "lapservo/vision/search/line_segmentation.h"
 #include "lapservo/vision/shaft/sampled_surface.h"
 
@@ -46,12 +45,26 @@ Eigen::Vector3d point_on(const ShaftPose& pose, const Marker& marker, double azi
   return pose.camera_from_unrolled * surface_point(marker.radius_m(), azimuth_rad, along_m);
 }
 
-// The stretch of a section with the most marker colour in it.
-Stretch<float> most_colourful_stretch(std::span<const std::uint8_t> classes, const Scene& scene) {
-  return heaviest_stretch(0, static_cast<int>(classes.size()), [&](int i) {
+// Neighbouring samples of a section, first to last; none when last < first.
+struct Stretch {
+  int first = 0, last = -1;
+  float sum = 0;
+};
+
+// With the most marker colour in it (maximum subarray).
+Stretch most_colourful_stretch(std::span<const std::uint8_t> classes, const Scene& scene) {
+  Stretch best;
+  float sum = 0;
+  int first = 0;
+  for (int i = 0; i < static_cast<int>(classes.size()); ++i) {
     const std::uint8_t colour = classes[static_cast<std::size_t>(i)];
-    return colour == Scene::outside ? 0.0F : static_cast<float>(section_gain(scene.is_ours(colour)));
-  });
+    if (colour != Scene::outside) sum += static_cast<float>(section_gain(scene.is_ours(colour)));
+    if (sum <= 0)
+      sum = 0, first = i + 1;
+    else if (sum > best.sum)
+      best = {first, i, sum};
+  }
+  return best;
 }
 
 // Sections across the shaft: where its colours begin and end.
@@ -77,7 +90,7 @@ SidePoints measure_sides(const Scene& scene, const ShaftPose& pose, const Cylind
       classes.push_back(colour);
       if (colour == Scene::outside && std::abs(i) * step_px < half_px) hidden_px += step_px;
     }
-    const Stretch<float> stretch = most_colourful_stretch(classes, scene);
+    const Stretch stretch = most_colourful_stretch(classes, scene);
     const double width_px = (stretch.last - stretch.first + 1) * step_px;
     if (hidden_px > max_hidden * 2 * half_px ||
         width_px < coarse_fit_limits.narrowest_section * (2 * half_px - hidden_px) ||

@@ -5,25 +5,15 @@
 #include <Eigen/Cholesky>
 
 #include "lapservo/core/angles.h"
-#include "lapservo/geometry/rotation.h"
 #include "lapservo/rig/registration_covariance.h"
 
 namespace lapservo::internal {
-namespace {
 
-using Registration = Eigen::Matrix<double, 6, 1>;
-
-Rigid3 moved(const Rigid3& camera_from_rcm, const Registration& by) {
-  return {rotation_by(by.tail<3>()) * camera_from_rcm.rotation, camera_from_rcm.translation + by.head<3>()};
-}
-
-Eigen::Vector4d difference(const JointVector& from, const JointVector& to) {
+Eigen::Vector4d configuration_change(const JointVector& from, const JointVector& to) {
   Eigen::Vector4d change = to.vector() - from.vector();
   for (const Eigen::Index angle : {0, 1, 3}) change[angle] = wrap_pi(change[angle]);
   return change;
 }
-
-}  // namespace
 
 RcmMeasurement RcmPrior::of(const ShaftPose& pose, double least_sigma_m) const {
   const Eigen::Matrix3d axes = pose.camera_from_unrolled.rotation.toRotationMatrix();
@@ -56,23 +46,20 @@ bool RcmPrior::is_within(double radius_m) const {
 std::optional<ConfigurationEstimate> configuration_estimate(
     const PoseUnknowns& unknowns, const PoseMatrix& covariance, const RcmPrior& registration,
     const Eigen::Matrix<double, pose_unknowns, 6>& pose_by_registration) {
-  constexpr double step = 1e-6;
   const auto q = configuration_of(unknowns.pose(), registration.camera_from_rcm);
   if (!q) return std::nullopt;
-  const auto slope = [&](const std::optional<JointVector>& changed) -> Eigen::Vector4d {
-    return changed ? Eigen::Vector4d(difference(*q, *changed) / step) : Eigen::Vector4d::Zero();
-  };
-  Eigen::Matrix<double, 4, pose_unknowns> by_pose;
-  Eigen::Matrix<double, 4, 6> by_registration;
-  for (int i = 0; i < pose_unknowns; ++i)
-    by_pose.col(i) =
-        slope(configuration_of(unknowns.changed_by(step * PoseVector::Unit(i)).pose(), registration.camera_from_rcm));
-  for (int i = 0; i < 6; ++i)
-    by_registration.col(i) =
-        slope(configuration_of(unknowns.pose(), moved(registration.camera_from_rcm, step * Registration::Unit(i))));
-  const Eigen::Matrix4d both = by_pose * pose_by_registration * by_registration.transpose();
+  Eigen::Matrix<double, 4, pose_unknowns> by_pose = Eigen::Matrix<double, 4, pose_unknowns>::Zero();
+  for (int i = 0; i < pose_unknowns; ++i) {
+    const ShaftPose changed = unknowns.changed_by(derivative_step * PoseVector::Unit(i)).pose();
+    if (const auto moved = configuration_of(changed, registration.camera_from_rcm))
+      by_pose.col(i) = configuration_change(*q, *moved) / derivative_step;
+  }
+  const Eigen::Matrix<double, 4, 6> slopes = by_registration(
+      registration.camera_from_rcm, *q,
+      [&](const Rigid3& camera_from_rcm) { return configuration_of(unknowns.pose(), camera_from_rcm); });
+  const Eigen::Matrix4d both = by_pose * pose_by_registration * slopes.transpose();
   return ConfigurationEstimate{*q, by_pose * covariance * by_pose.transpose() + both + both.transpose() +
-                                       by_registration * registration.covariance * by_registration.transpose()};
+                                       slopes * registration.covariance * slopes.transpose()};
 }
 
 }  // namespace lapservo::internal

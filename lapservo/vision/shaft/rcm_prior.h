@@ -4,11 +4,13 @@
 
 #include <Eigen/Core>
 
+#include "lapservo/geometry/rotation.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/vision/shaft/shaft_pose.h"
 
 namespace lapservo::internal {
 
+inline constexpr double derivative_step = 1e-6;
 using RegistrationMatrix = Eigen::Matrix<double, 6, 6>;
 
 /// That a shaft's axis passes the RCM, as a measurement of the pose: its two distances from the RCM, 0 within what the
@@ -36,6 +38,28 @@ struct RcmPrior {
 
 /// Nullopt where the rig knows nothing of it.
 std::optional<RcmPrior> registration_of(const Instrument& instrument);
+
+/// theta, phi, rho, psi; angles the shorter way.
+Eigen::Vector4d configuration_change(const JointVector& from, const JointVector& to);
+
+/// How q depends on the registration's translation [m] and rotation vector about the camera's axes [rad]. `q_of`: an
+/// optional JointVector by camera_from_rcm; a column is zero where there is none.
+template <typename Configuration>
+Eigen::Matrix<double, 4, 6> by_registration(const Rigid3& camera_from_rcm, const JointVector& q,
+                                            const Configuration& q_of) {
+  Eigen::Matrix<double, 4, 6> slopes = Eigen::Matrix<double, 4, 6>::Zero();
+  for (int i = 0; i < 6; ++i) {
+    Rigid3 moved = camera_from_rcm;
+    const Eigen::Vector3d step = derivative_step * Eigen::Vector3d::Unit(i % 3);
+    if (i < 3)
+      moved.translation += step;
+    else
+      moved.rotation = rotation_by(step) * moved.rotation;
+    if (const std::optional<JointVector> changed = q_of(moved))
+      slopes.col(i) = configuration_change(q, *changed) / derivative_step;
+  }
+  return slopes;
+}
 
 /// q by a pose and a registration, and how sure it is by both, in the order theta, phi, rho, psi; to first order.
 struct ConfigurationEstimate {
