@@ -164,7 +164,8 @@ Trajectory sinusoids(const Sinusoids& sinusoids) {
 Trajectory via_points(const std::vector<Eigen::Vector4d>& points, const Eigen::Vector4d& max_rate, double dwell_s) {
   if (points.size() < 2) throw InputError("trajectory", "points", std::to_string(points.size()), "two points or more");
   require_positive_features("max_rate", max_rate);
-  if (!(dwell_s >= 0)) throw InputError("trajectory", "dwell_s", std::to_string(dwell_s), "0 or more seconds");
+  if (!(dwell_s >= 0 && std::isfinite(dwell_s)))
+    throw InputError("trajectory", "dwell_s", std::to_string(dwell_s), "0 or more seconds");
   std::vector<Segment> segments;
   Eigen::Vector4d from = points.front();
   double start_s = 0;

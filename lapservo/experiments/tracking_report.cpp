@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 
 #include <fmt/format.h>
 
@@ -129,8 +130,10 @@ Table decay_table(const TrackingResult& result, const Eigen::Vector4d& gains_per
 }
 
 std::string hold_text(const TrackingRun& run) {
-  return fmt::format("{:.0f} ms, {:.0f} ms, {:.2f} s", 1000 * run.held_s.value_or(NAN),
-                     1000 * run.resumed_s.value_or(NAN), run.back_s.value_or(NAN));
+  const auto text = [](const std::optional<double>& time_s) {
+    return time_s ? fmt::format("{:.3f} s", *time_s) : std::string("never");
+  };
+  return fmt::format("{}, {}, {}", text(run.held_s), text(run.resumed_s), text(run.back_s));
 }
 
 std::vector<Comparison> comparisons(const TrackingResult& result, const Eigen::Vector4d& gains_per_s) {

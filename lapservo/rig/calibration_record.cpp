@@ -14,6 +14,7 @@
 #include "lapservo/core/known_keys.h"
 #include "lapservo/core/yaml_field.h"
 #include "lapservo/rig/rig.h"
+#include "lapservo/rig/rig_files.h"
 
 namespace lapservo::internal {
 namespace {
@@ -98,12 +99,7 @@ std::string content_state(const fs::path& path) {
 std::string rig_state(const fs::path& path) {
   const Rig rig = load_rig(path);
   std::string state = content_state(path);
-  const auto add = [&](const fs::path& file) {
-    if (!file.empty()) state.append(" ").append(content_state(file));
-  };
-  add(rig.camera_file);
-  for (const Instrument& instrument : rig.instruments)
-    if (instrument.tool) add(instrument.tool->file);
+  each_file(rig, [&](const fs::path& file) { state.append(" ").append(content_state(file)); });
   return state;
 }
 

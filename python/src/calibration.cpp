@@ -92,6 +92,7 @@ py::dict calibrate_camera(const py::list& pictures, const std::string& corners, 
     throw InputError("square_m", "width", fmt::format("{}", square_m), "0.0001 to 1 m");
   if (most_views < 4 || most_views > 200)
     throw InputError("views", "number", fmt::format("{}", most_views), "4 to 200");
+  if (pictures.empty()) throw InputError("frames", "is empty, expected images, folders or videos of the board");
   const Board board = board_of({corners, square_m, dictionary, marker_m}, names);
   std::optional<GivenRig> given;
   if (!rig.is_none()) given = rig_of(rig);
@@ -104,7 +105,7 @@ py::dict calibrate_camera(const py::list& pictures, const std::string& corners, 
     constexpr double fps = 30;
     const GivenFrames frames(py::reinterpret_borrow<py::object>(each), fps, given ? &given->rig.camera : nullptr, false,
                              false);
-    name = name.empty() || name == frames.name ? frames.name : name + " and others";
+    name = name.empty() || name == frames.name ? frames.name : frames.name + " and others";
     const py::gil_scoped_release others_run;
     recordings.look_at(*frames.source, frames.name, watch);
     if (const std::string& latest = recordings.read().complaint; !latest.empty())
@@ -141,12 +142,11 @@ py::dict calibrate_colour(const py::object& frames, const py::object& rig, const
   const GivenRig given = rig_of(rig);
   const std::size_t index = index_of(given, instrument);
   const GivenFrames source(frames, fps, &given.rig.camera, deinterlace);
-  const bool keep_response = !replace_response && given.rig.camera.response.sigma.has_value();
   ColourMeasurement measured;
   {
     const py::gil_scoped_release others_run;
-    measured =
-        measure_colour(given.rig, index, {*source.source, source.name, deinterlace}, keep_response, watch_of(progress));
+    measured = measure_colour(given.rig, index, {*source.source, source.name, deinterlace}, replace_response,
+                              watch_of(progress));
   }
   const ColourCalibration& calibration = measured.calibration;
   expect_result(calibration.refusal, source.name);

@@ -12,6 +12,7 @@
 #include "lapservo/core/atomic_file.h"
 #include "lapservo/core/error.h"
 #include "lapservo/rig/camera_formats.h"
+#include "lapservo/rig/rig_files.h"
 #include "lapservo/rig/rig_writer.h"
 #include "lapservo/tool/wrist.h"
 #include "python/src/bindings.h"
@@ -190,10 +191,7 @@ q = sign * joints + offset, rad and m.)");
 }  // namespace
 
 Rig with_absolute_files(Rig rig) {
-  if (!rig.camera_file.empty()) rig.camera_file = std::filesystem::absolute(rig.camera_file);
-  for (Instrument& instrument : rig.instruments)
-    if (instrument.tool && !instrument.tool->file.empty())
-      instrument.tool->file = std::filesystem::absolute(instrument.tool->file);
+  internal::each_file(rig, [](auto& file) { file = std::filesystem::absolute(file); });
   return rig;
 }
 

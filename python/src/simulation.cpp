@@ -1,7 +1,10 @@
+#include <cmath>
 #include <memory>
 #include <string>
 #include <utility>
 #include <vector>
+
+#include <fmt/format.h>
 
 #include "lapservo/core/error.h"
 #include "lapservo/sim/instrument_shaft.h"
@@ -25,6 +28,7 @@ class RigRenderer {
 
   Image render(const Array<"q", Eigen::Dynamic, 4>& given, std::uint64_t seed) {
     const std::vector<Eigen::Vector4d> q = rows_of(given.value);
+    if (!given.value.allFinite()) throw InputError("Renderer.render", "q", "not a number", "finite numbers");
     if (q.size() != rig_.instruments.size())
       throw InputError("Renderer.render", "q", std::to_string(q.size()) + " configurations",
                        "one for each instrument: " + std::to_string(rig_.instruments.size()));
@@ -68,6 +72,10 @@ void bind_simulation(py::module_& m) {
   py::class_<RigRenderer>(m, "Renderer", "Frames of a rig's instruments before tissue, from physical geometry.")
       .def(py::init([](const Rig& rig, double blur_px, double noise, double light, double smoke, double film_m,
                        std::uint64_t seed) {
+             for (const double number : {blur_px, noise, light, smoke, film_m})
+               if (!(number >= 0 && std::isfinite(number)))
+                 throw InputError("Renderer", "blur_px, noise, light, smoke or film_m", fmt::format("{}", number),
+                                  "0 or more");
              RenderOptions options;
              options.sensor.blur_px = blur_px;
              options.sensor.read_noise *= noise;

@@ -8,6 +8,7 @@
 
 #include "lapservo/core/error.h"
 #include "lapservo/io/image_file.h"
+#include "lapservo/rig/rig_files.h"
 #include "recordings/bag_endings.h"
 
 namespace lapservo::app {
@@ -54,9 +55,7 @@ void InputFiles::add(const fs::path& path) {
 
 void InputFiles::add_rig(const fs::path& path, const Rig& rig) {
   add(path);
-  add(rig.camera_file);
-  for (const Instrument& instrument : rig.instruments)
-    if (instrument.tool) add(instrument.tool->file);
+  internal::each_file(rig, [this](const fs::path& file) { add(file); });
 }
 
 void InputFiles::add_pictures_in(const fs::path& folder) {

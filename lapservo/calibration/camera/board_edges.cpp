@@ -169,7 +169,6 @@ std::optional<BoardEdgeFit> fit_edge(const EdgePixels& edge, int channel,
   const Eigen::Matrix<double, 5, 5> covariance =
       inverse_of_symmetric(normal) * (residual_squares / std::max(1.0, count - 5));
   fit.offset_px = p[2], fit.slope = p[3], fit.blur_px = p[4];
-  fit.dark = std::min(p[0], p[0] + p[1]), fit.bright = std::max(p[0], p[0] + p[1]);
   fit.towards_bright = p[1] > 0 ? 1 : -1;
   fit.sigma_px = std::sqrt(covariance(2, 2));
   if (!std::isfinite(fit.sigma_px) || fit.sigma_px > 0.5 || fit.blur_px > 0.6 * edge.reach_px) return std::nullopt;

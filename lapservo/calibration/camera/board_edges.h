@@ -49,10 +49,9 @@ std::vector<EdgePixels> edges_of(const Board& board, const std::vector<BoardCorn
 struct BoardEdgeFit {
   double offset_px = 0, slope = 0;  ///< distance to the path at mean_fraction, and its change along the edge
   double mean_fraction = 0, spread_fraction = 0;
-  double dark = 0, bright = 0;  ///< light
-  double blur_px = 0;           ///< one sigma
-  double sigma_px = 0;          ///< of offset_px, by the pixels' scatter about the fit
-  int towards_bright = 0;       ///< 1 where `normal` points to the brighter square, else -1
+  double blur_px = 0;      ///< one sigma
+  double sigma_px = 0;     ///< of offset_px, by the pixels' scatter about the fit
+  int towards_bright = 0;  ///< 1 where `normal` points to the brighter square, else -1
 };
 
 /// nullopt where there is no such edge: too little contrast, saturated, or a fit that leaves it.

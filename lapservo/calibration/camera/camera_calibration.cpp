@@ -19,7 +19,7 @@
 namespace lapservo::internal {
 namespace {
 
-constexpr std::size_t least_views = 4, least_corners = 12;
+constexpr std::size_t least_views = 4;
 constexpr double least_tilt_rad = rad_from_deg(15);
 // Worse than these, one sigma, and the views are too alike.
 constexpr double max_focal_sigma = 0.003, max_centre_sigma_px = 5;
@@ -153,7 +153,7 @@ void add_residuals(const CameraAdjustment& adjustment, const MeasuredEdges& edge
       const double residual_px = adjustment.residuals_px[i][k];
       of_view.push_back(residual_px), all.push_back(residual_px);
     }
-    calibration.view_rms_px.push_back(rms(of_view));
+    calibration.view_rms_px.push_back(of_view.empty() ? std::nullopt : std::optional(rms(of_view)));
   }
   calibration.rms_px = rms(all);
 }
@@ -364,7 +364,6 @@ CameraCalibration calibrate_camera(const Board& board, const std::vector<BoardVi
   calibration.camera = rounded_by_sigmas(adjustment->camera, adjustment->sigmas);
   calibration.sigmas = adjustment->sigmas;
   calibration.bright_wider_px = adjustment->bright_wider_px[green];
-  calibration.poses = adjustment->camera_from_board;
   add_residuals(*adjustment, edges, calibration);
   calibration.noise = adjustment->noise, calibration.faults = texts_of(adjustment->faults, views);
   if (const std::string why = refusal_of(*adjustment, views); !why.empty()) return refuse(why);

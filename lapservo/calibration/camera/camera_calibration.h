@@ -28,6 +28,8 @@ struct BoardView {
 /// Chooses, out of the frames of a video, those that show the board differently.
 class BoardViews {
  public:
+  static constexpr std::size_t least_corners = 12;  ///< of a view
+
   BoardViews(Board board, std::size_t most) : board_(std::move(board)), most_(most) {}
 
   /// Keeps the image when its board lies elsewhere than in all that were kept, or, with `always`, wherever it lies.
@@ -55,11 +57,11 @@ struct CameraCalibration {
   Camera camera;
   CameraSigmas sigmas;
   std::optional<ResponseFit> response;  ///< nullopt where the images do not determine it: the camera's response stays
-  std::vector<double> view_rms_px;      ///< of edges about the fit, by view, green
+  std::vector<std::optional<double>>
+      view_rms_px;  ///< of edges about the fit, by view, green; none where none is measured
   double rms_px = 0;
   double noise = 1;                 ///< how many times the edges' own noise that is, of all colours; robust
   std::vector<std::string> faults;  ///< that show beyond the noise, one sentence each: the sigmas count them
-  std::vector<Rigid3> poses;        ///< camera_from_board, by view
   double bright_wider_px = 0;  ///< with the calibrated response, green: 0 for a board whose squares are equally wide
 };
 

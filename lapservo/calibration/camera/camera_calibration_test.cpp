@@ -164,7 +164,7 @@ void expect_response(const ResponseCase& c, int views, std::uint64_t seed, bool 
   const double error = difference_within(fit.response, c.response, fit.low, fit.high);
   std::printf("%s light, blur %.1f px, %s: %s, error %.4f, sigma %.4f, error / sigma %.2f, misfit %.2f\n",
               c.falloff > 0 ? "uneven" : "even", c.blur_px, c.name.c_str(), named ? fit.nearest.c_str() : "table",
-              error, fit.sigma, error / fit.sigma, fit.misfit[1]);
+              error, fit.sigma, error / fit.sigma, fit.misfit);
   if (with_psi)
     std::printf("  psi %.2f mrad rms, with the true response %.2f\n", psi_rms_mrad(c.response, fit.response, seed),
                 psi_rms_mrad(c.response, c.response, seed));

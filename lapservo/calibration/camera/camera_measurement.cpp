@@ -61,6 +61,9 @@ Board board_of(const BoardWords& words, const BoardWords::Names& names) {
 
 BoardRecordings::BoardRecordings(const Board& board, std::size_t most_views, const std::optional<Rig>& rig)
     : views_(board, most_views), whose_("the rig's camera") {
+  if (static_cast<std::size_t>(board.columns * board.rows) < BoardViews::least_corners)
+    throw InputError("board", "inner corners", fmt::format("{}x{}", board.columns, board.rows),
+                     fmt::format("{} or more to calibrate a camera", BoardViews::least_corners));
   if (rig) size_ = cv::Size(rig->camera.width_px, rig->camera.height_px);
 }
 

@@ -31,7 +31,8 @@ Board board_of(const BoardWords& words, const BoardWords::Names& names = {});
 /// or fewer.
 class BoardRecordings {
  public:
-  /// `rig`: its camera took them and gives their size; else the first one does.
+  /// `rig`: its camera took them and gives their size; else the first one does. Throws InputError for a board of fewer
+  /// corners than a view needs.
   BoardRecordings(const Board& board, std::size_t most_views, const std::optional<Rig>& rig);
 
   /// Gathers views of a live camera until they suffice; `say` receives advice for the next view. Throws InputError at

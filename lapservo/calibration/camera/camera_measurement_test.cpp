@@ -10,7 +10,7 @@ namespace lapservo::internal {
 namespace {
 
 int looked_at(int frames, double fps) {
-  BoardRecordings recordings({}, 30, std::nullopt);
+  BoardRecordings recordings({.columns = 9, .rows = 6}, 30, std::nullopt);
   EvenFrames video({64, 48}, frames, fps);
   recordings.look_at(video, "video", {});
   return recordings.read().looked_at;

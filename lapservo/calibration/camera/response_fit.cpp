@@ -464,15 +464,14 @@ std::optional<ResponseFit> fit_response(const std::vector<BoardEdgeProfile>& pro
   if (profiles.size() < least_profiles) return std::nullopt;
   ResponseFit fit;
   ProfileFit fitted(profiles, start, at_iteration);
-  fit.misfit[0] = fitted.misfit();
   if (!fitted.solve()) return std::nullopt;
-  fit.misfit[1] = fitted.misfit();
+  fit.misfit = fitted.misfit();
   fit.sharpening = fitted.sharpened() ? fitted.shared().strength : 0;
   fit.sharpening_px = std::exp(fitted.shared().log_mask_px);
   std::vector<double> darks, brights;
   for (const BoardEdgeProfile& p : profiles) darks.push_back(p.dark), brights.push_back(p.bright);
   fit.low = quantile(darks, 0.02), fit.high = quantile(brights, 0.98);
-  const double part = independent_part(profiles) / std::pow(std::max(1.0, fit.misfit[1]), 2);
+  const double part = independent_part(profiles) / std::pow(std::max(1.0, fit.misfit), 2);
   const auto posterior = posterior_of(fitted.problem(), fitted.shared(), part);
   if (!posterior) return std::nullopt;
   fit.sigma = sigma_of(*posterior, fit.low, fit.high);

@@ -18,7 +18,7 @@ struct ResponseFit {
   std::string nearest;                       ///< name of the most likely named response
   double low = 0, high = 1;                  ///< the values that were seen
   double sharpening = 0, sharpening_px = 0;  ///< unsharp mask: its strength and its blur
-  std::array<double, 2> misfit{};            ///< rms of values about the profiles, before (as started) and after
+  double misfit = 0;                         ///< rms of values about the profiles, in units of their noise
 };
 
 /// The response from blurred edges of a board that lie where the geometry has them: bright and dark squares are equally

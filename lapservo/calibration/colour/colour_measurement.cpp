@@ -12,7 +12,7 @@
 namespace lapservo::internal {
 
 ColourMeasurement measure_colour(const Rig& rig, std::size_t instrument, const FrameRecording& recording,
-                                 bool keep_response, const JobWatch& watch) {
+                                 bool replace_response, const JobWatch& watch) {
   constexpr std::size_t most = 48;
   SpreadFrames kept(most);
   const bool live = recording.source.kind() == FrameSource::Kind::live;
@@ -24,10 +24,13 @@ ColourMeasurement measure_colour(const Rig& rig, std::size_t instrument, const F
   // A camera goes on for ever: the user ends what is enough.
   if (measured.read.stopped && !live) return measured.calibration.refusal = "stopped", measured;
   measured.frames = kept.frames().size();
+  const bool is_named = recording.source.is_srgb();
+  const bool keep_response = is_named || (!replace_response && rig.camera.response.sigma.has_value());
   int step = 0;
   measured.calibration = calibrate_colour(rig, instrument, kept.frames(), keep_response, [&](const std::string& what) {
     watch.tell(std::nullopt, ++step, ": " + what);
   });
+  if (is_named) measured.calibration.response_found = "as it is: the recording names how it encodes light";
   if (!measured.calibration.refusal.empty()) {
     FrameDiagnosis diagnosis(rig);
     for (const cv::Mat& bgr : kept.frames()) diagnosis.add(bgr, {});

@@ -16,10 +16,11 @@ struct ColourMeasurement {
   FramesRead read;
 };
 
-/// Calibrates by a marker in motion, a live camera's until it is stopped. keep_response: see calibrate_colour(). Throws
-/// InputError as read_frames().
+/// Calibrates by a marker in motion, a live camera's until it is stopped. A response that calibrate camera measured
+/// stays without `replace_response`, and any that images are read by as they say themselves. Throws InputError as
+/// read_frames().
 ColourMeasurement measure_colour(const Rig& rig, std::size_t instrument, const FrameRecording& recording,
-                                 bool keep_response, const JobWatch& watch);
+                                 bool replace_response, const JobWatch& watch);
 
 /// The hues, in degrees.
 std::vector<CalibratedNumber> calibrated_numbers(const Marker& before, const ColourCalibration& calibration);

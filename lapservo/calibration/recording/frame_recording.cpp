@@ -22,7 +22,7 @@ void expect_srgb(const FrameSource& source, const std::string& recording, const 
   if (!source.is_srgb() || response.kind == Response::Kind::srgb || response.sigma) return;
   throw InputError(recording,
                    "names how it encodes light, which is read as sRGB, but the rig's response is another, "
-                   "expected srgb, or one that calibrate camera or colour measured");
+                   "expected srgb, or one that calibrate camera measured with such images");
 }
 
 void check_frame_size(const Frame& frame, const std::string& recording, const cv::Size& expected,

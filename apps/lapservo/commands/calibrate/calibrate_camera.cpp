@@ -63,8 +63,9 @@ void print_result(const std::vector<BoardView>& views, const CameraCalibration& 
   std::printf("%zu views; edges miss the fit by %.3f px rms, %.1f times their noise\n", views.size(),
               calibration.rms_px, calibration.noise);
   for (std::size_t i = 0; i < views.size(); ++i)
-    std::printf("  %-40s %4zu corners   %.3f px\n", views[i].name.c_str(), views[i].corners.size(),
-                calibration.view_rms_px[i]);
+    fmt::print("  {:40} {:4} corners   {}\n", views[i].name, views[i].corners.size(),
+               calibration.view_rms_px[i] ? fmt::format("{:.3f} px", *calibration.view_rms_px[i])
+                                          : "no edge can be measured, so it does not count");
   for (const CalibratedNumber& n : calibrated_numbers(Camera{}, calibration))
     std::printf("  %-24s %12.6f   sigma %.6f\n", n.name.c_str(), n.after, n.sigma);
   print_faults(calibration.faults);

@@ -37,9 +37,8 @@ int calibrate_colour(const CalibrateColourOptions& options) {
   watch_for_interrupts();
 
   const bool live = source->kind() == FrameSource::Kind::live;
-  const bool keep_response = !options.replace_response && rig.camera.response.sigma.has_value();
-  const ColourMeasurement measured =
-      measure_colour(rig, index, {*source, options.input, options.deinterlace}, keep_response, watched_job());
+  const ColourMeasurement measured = measure_colour(rig, index, {*source, options.input, options.deinterlace},
+                                                    options.replace_response, watched_job());
   const ColourCalibration& calibration = measured.calibration;
   if (live || !measured.read.stopped) say_complaint(options.input, measured.read.complaint);
   if (!calibration.refusal.empty()) return refuse_calibration(options, calibration.refusal);
