@@ -3,7 +3,6 @@
 #include <filesystem>
 #include <random>
 #include <string>
-#include <tuple>
 #include <utility>
 #include <vector>
 

@@ -3,8 +3,6 @@
 #include <fstream>
 #include <lz4frame.h>
 #include <map>
-#include <stdexcept>
-#include <utility>
 #include <zstd.h>
 
 #include "recordings/test_bags.h"

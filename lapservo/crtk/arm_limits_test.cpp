@@ -1,5 +1,8 @@
 #include "lapservo/crtk/arm_limits.h"
 
+#include <string>
+#include <utility>
+
 #include <gtest/gtest.h>
 
 #include "lapservo/testing/input_error.h"
@@ -23,21 +26,19 @@ TEST(ArmLimits, WrongOnesAreRefusedByName) {
     testing::write_file(folder / "limits.yaml", text);
     return testing::input_error([&] { load_arm_limits(folder / "limits.yaml"); });
   };
-  const std::string rates = "rate: [1, 1, 1, 1]\nacceleration: [1, 1, 1, 1]\n";
-  EXPECT_NE(complaint("lower: [0, 0, 0]\nupper: [1, 1, 1, 1]\n" + rates).find(": lower: "), std::string::npos);
-  EXPECT_NE(complaint("lower: [0, 2, 0, 0]\nupper: [1, 1, 1, 1]\n" + rates).find(": upper: "), std::string::npos);
-  EXPECT_NE(complaint("lower: [0, 0, 0, 0]\nupper: [1, 1, 1, 1]\nrate: [1, 0, 1, 1]\nacceleration: [1, 1, 1, 1]\n")
-                .find(": rate: "),
-            std::string::npos);
-  EXPECT_NE(complaint("lower: [0, 0, 0, 0]\n" + rates).find(": upper: "), std::string::npos);
-  EXPECT_NE(complaint("lower: [-85, -50, 0, -260]\nupper: [85, 50, 0.2, 260]\n" + rates).find("-85 looks like degrees"),
-            std::string::npos);
-  EXPECT_NE(complaint("lower: [-1, -1, 10, -4]\nupper: [1, 1, 240, 4]\n" + rates).find("10 looks like millimetres"),
-            std::string::npos);
-  EXPECT_NE(complaint("lower: [0, 0, 0, 0]\nupper: [1, 1, 1, 1]\nrate: [20, 1, 1, 1]\nacceleration: [1, 1, 1, 1]\n")
-                .find("rate: is a list of 4, expected radians within 10 for number 1: 20 looks like degrees"),
-            std::string::npos);
-  EXPECT_NE(complaint("lowr: [0, 0, 0, 0]\n" + rates).find("lowr"), std::string::npos);
+  const std::string places = "lower: [0, 0, 0, 0]\nupper: [1, 1, 1, 1]\n",
+                    acceleration = "acceleration: [1, 1, 1, 1]\n", rates = "rate: [1, 1, 1, 1]\n" + acceleration;
+  for (const auto& [text, said] :
+       {std::pair{"lower: [0, 0, 0]\nupper: [1, 1, 1, 1]\n" + rates, ": lower: "},
+        {"lower: [0, 2, 0, 0]\nupper: [1, 1, 1, 1]\n" + rates, ": upper: "},
+        {places + "rate: [1, 0, 1, 1]\n" + acceleration, ": rate: "},
+        {"lower: [0, 0, 0, 0]\n" + rates, ": upper: "},
+        {"lower: [-85, -50, 0, -260]\nupper: [85, 50, 0.2, 260]\n" + rates, "-85 looks like degrees"},
+        {"lower: [-1, -1, 10, -4]\nupper: [1, 1, 240, 4]\n" + rates, "10 looks like millimetres"},
+        {places + "rate: [20, 1, 1, 1]\n" + acceleration,
+         "rate: is a list of 4, expected radians within 10 for number 1: 20 looks like degrees"},
+        {"lowr: [0, 0, 0, 0]\n" + rates, "lowr"}})
+    EXPECT_NE(complaint(text).find(said), std::string::npos) << text;
 }
 
 }  // namespace

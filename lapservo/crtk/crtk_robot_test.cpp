@@ -3,6 +3,7 @@
 #include <atomic>
 #include <cstdint>
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -10,6 +11,7 @@
 #include "lapservo/crtk/joint_map.h"
 #include "lapservo/crtk/operator_presence.h"
 #include "lapservo/crtk/test_transport.h"
+#include "lapservo/testing/process.h"
 #include "lapservo/testing/wait_for.h"
 
 namespace lapservo::internal {
@@ -68,31 +70,11 @@ TEST(CrtkRobot, SendsSetPointsOfAllJointsInItsOwnThreadUntilSomethingIsAmiss) {
 }
 
 TEST(CrtkRobot, ACommandOfAnotherByAnyTopicOfMotionHolds) {
-  for (const char* topic : {"servo_jp",
-                            "servo_jr",
-                            "servo_jv",
-                            "servo_jf",
-                            "pid_feed_forward/servo_jf",
-                            "move_jp",
-                            "move_jr",
-                            "servo_cp",
-                            "servo_cr",
-                            "move_cp",
-                            "move_cr",
-                            "servo_cv",
-                            "servo_cf",
-                            "body/servo_cf",
-                            "spatial/servo_cf",
-                            "servo_cs",
-                            "servo_ci",
-                            "servo_js",
-                            "../PID/PSM1/servo_jp",
-                            "../PID/PSM1/servo_jf",
-                            "../PID/PSM1/feed_forward/servo_jf",
-                            "../PID/PSM1/enable",
-                            "use_gravity_compensation",
-                            "hold",
-                            "free"}) {
+  for (const std::string& topic : testing::words_of(
+           "servo_jp servo_jr servo_jv servo_jf pid_feed_forward/servo_jf move_jp move_jr servo_cp servo_cr move_cp "
+           "move_cr servo_cv servo_cf body/servo_cf spatial/servo_cf servo_cs servo_ci servo_js "
+           "../PID/PSM1/servo_jp ../PID/PSM1/servo_jf ../PID/PSM1/feed_forward/servo_jf ../PID/PSM1/enable "
+           "use_gravity_compensation hold free")) {
     TestTransport transport;
     StandingClock clock;
     CrtkRobot robot(transport, "PSM1", config_of(true), clock);

@@ -5,7 +5,6 @@
 #include <variant>
 
 #include <gtest/gtest.h>
-#include <opencv2/imgproc.hpp>
 
 #include "lapservo/core/random.h"
 #include "lapservo/io/pictures/png_encoding.h"

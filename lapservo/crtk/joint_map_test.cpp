@@ -1,14 +1,10 @@
 #include "lapservo/crtk/joint_map.h"
 
-#include <algorithm>
-#include <cmath>
 #include <numbers>
 
-#include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
 #include "lapservo/core/random.h"
-#include "lapservo/kinematics/rcm_kinematics.h"
 
 namespace lapservo::internal {
 namespace joint_map_test {
@@ -34,48 +30,6 @@ TEST(JointMap, LimitsOfAReversedJointChangePlaces) {
   const JointLimits q = limits_of_q(psm(), limits);
   EXPECT_TRUE(q.lower.isApprox(Eigen::Vector4d(-1, half_pi - 0.9, 0.01 - 0.0156, -4)));
   EXPECT_TRUE(q.upper.isApprox(Eigen::Vector4d(1, half_pi + 0.5, 0.24 - 0.0156, 4)));
-}
-
-// The dVRK's modified DH table of a PSM: its shaft's axis and roll are those of theta = yaw, phi = pi/2 - pitch, psi =
-// roll + constant in an RCM frame that is a fixed rotation of the arm's base.
-Eigen::Matrix3d modified_dh(double alpha, double theta) {
-  return (Eigen::AngleAxisd(alpha, Eigen::Vector3d::UnitX()) * Eigen::AngleAxisd(theta, Eigen::Vector3d::UnitZ()))
-      .toRotationMatrix();
-}
-Eigen::Matrix3d base_from_shaft(double yaw, double pitch, double roll) {
-  return modified_dh(half_pi, yaw + half_pi) * modified_dh(-half_pi, pitch - half_pi) * modified_dh(half_pi, 0) *
-         modified_dh(0, roll);
-}
-Eigen::Matrix3d rcm_from_instrument(const Eigen::Vector4d& q) {
-  return (Eigen::AngleAxisd(q[0], Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(q[1], Eigen::Vector3d::UnitY()) *
-          Eigen::AngleAxisd(q[3], Eigen::Vector3d::UnitZ()))
-      .toRotationMatrix();
-}
-// The largest difference of both over random joints.
-double disagreement(const Joints& joints) {
-  const auto by_rig = [&](double yaw, double pitch, double roll) {
-    return rcm_from_instrument(q_from_joints(joints, {yaw, pitch, 0.1, roll}));
-  };
-  const Eigen::Matrix3d rcm_from_base = by_rig(0, 0, 0) * base_from_shaft(0, 0, 0).transpose();
-  Random random(2);
-  double largest = 0;
-  for (int k = 0; k < 50; ++k) {
-    const double yaw = 0.5 * random.normal(), pitch = 0.3 * random.normal(), roll = random.normal();
-    const Eigen::Matrix3d by_dh = rcm_from_base * base_from_shaft(yaw, pitch, roll);
-    largest = std::max(largest, (by_dh - by_rig(yaw, pitch, roll)).cwiseAbs().maxCoeff());
-  }
-  return largest;
-}
-
-TEST(JointMap, APsmTurnsAsItsDhTable) {
-  Joints joints = psm();
-  joints.offset[3] = std::numbers::pi;  // the RCM frame has phi between 0 and pi
-  EXPECT_LT(disagreement(joints), 1e-9);
-  for (const std::size_t i : {0, 1, 3}) {
-    Joints wrong = joints;
-    wrong.sign[i] = -wrong.sign[i];
-    EXPECT_GT(disagreement(wrong), 0.1) << i;
-  }
 }
 
 TEST(JointMap, FindsTheFourAmongOthersAndRefusesMissingAndRepeatedOnes) {

@@ -2,8 +2,6 @@
 
 #include <atomic>
 #include <chrono>
-#include <cstdlib>
-#include <functional>
 #include <memory>
 #include <set>
 #include <string>

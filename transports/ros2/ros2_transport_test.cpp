@@ -1,11 +1,8 @@
 #include "transports/ros2/ros2_transport.h"
 
-#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstdint>
-#include <cstdlib>
-#include <functional>
 #include <memory>
 #include <set>
 #include <string>

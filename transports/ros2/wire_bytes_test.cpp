@@ -3,7 +3,6 @@
 
 #include <cstdlib>
 #include <dds/ddsi/ddsi_serdata.h>
-#include <filesystem>
 #include <fstream>
 #include <limits>
 #include <map>

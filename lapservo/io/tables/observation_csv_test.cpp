@@ -3,7 +3,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <filesystem>
 #include <limits>
 #include <string>
 #include <utility>
@@ -14,8 +13,6 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/core/csv.h"
 #include "lapservo/core/random.h"
-#include "lapservo/testing/input_error.h"
-#include "lapservo/testing/temporary_folder.h"
 
 namespace lapservo::internal {
 namespace observation_csv_test {

@@ -1,6 +1,5 @@
 // Colour edges at known places through what FFmpeg writes, by where the format or its tags put chroma.
 #include <algorithm>
-#include <array>
 #include <string>
 #include <vector>
 

@@ -1,6 +1,5 @@
 // Pure colours through the videos that FFmpeg writes, by matrix, range, codec and sampling of chroma.
 #include <array>
-#include <cstddef>
 #include <string>
 #include <tuple>
 

@@ -1,9 +1,7 @@
 #include "lapservo/io/video/video_writer.h"
 
-#include <csignal>
 #include <filesystem>
 #include <string>
-#include <sys/resource.h>
 #include <sys/stat.h>
 
 #include <gtest/gtest.h>
