@@ -25,7 +25,9 @@ using lapservo::testing::press_path;
 using lapservo::testing::RawConnection;
 using lapservo::testing::start_path;
 
-PageConfig config_of_test() {
+using Change = void (*)(PageConfig&);
+
+PageConfig config_of_test(Change change = [](PageConfig&) {}) {
   PageConfig config;
   config.title = "test";
   config.port = 0;
@@ -33,6 +35,7 @@ PageConfig config_of_test() {
   config.limits.first_s = config.limits.head_s = 0.3;
   config.limits.patience_s = 0.2;
   config.limits.connections = config.limits.connections_per_address = 16;
+  change(config);
   return config;
 }
 
@@ -49,11 +52,15 @@ PageImage image_of(const Rig& rig, double brightness) {
 
 // A page that is served; get() and post() give the status.
 struct Served : LivePage {
-  explicit Served(const PageConfig& config = config_of_test()) : LivePage(config) {}
+  explicit Served(Change change = [](PageConfig&) {}) : LivePage(config_of_test(change)) {}
   int get(const std::string& path, const std::string& headers = "") const {
     return http_status(http(port, "GET", path, headers));
   }
   int post(const std::string& path) const { return http_status(http_post(port, path)); }
+  // The head of a request that other lines may follow.
+  std::string question(const std::string& path) const {
+    return fmt::format("GET {} HTTP/1.1\r\nHost: 127.0.0.1:{}\r\n", path, port);
+  }
   std::string state() const { return http(port, "GET", "/state"); }
   bool tells(const std::string& part) const { return state().find(part) != std::string::npos; }
   // Like the page: requests again after a timeout.
@@ -127,9 +134,7 @@ TEST(LivePage, TellsWhatTheLoopDoes) {
 
 // An image that is old says nothing of now.
 TEST(LivePage, ForgetsWhatOldImagesShowed) {
-  PageConfig config = config_of_test();
-  config.live = true;
-  Served page(config);
+  Served page;
   PageImage image = image_of(testing::small_test_rig(), 10);
   image.observations[0].status = Status::ok;
   image.age_s = 5.2;
@@ -141,9 +146,8 @@ TEST(LivePage, ForgetsWhatOldImagesShowed) {
 }
 
 TEST(LivePage, HoldsAlwaysAndStartsOnlyWhereMotionIsEnabled) {
-  PageConfig config = config_of_test();
   {
-    Served page(config);
+    Served page;
     EXPECT_EQ(page.post(start_path()), 403);
     EXPECT_FALSE(page.take_wishes().hold);
     EXPECT_EQ(page.post("/hold"), 202);
@@ -156,25 +160,22 @@ TEST(LivePage, HoldsAlwaysAndStartsOnlyWhereMotionIsEnabled) {
     EXPECT_TRUE(page.take_wishes().stop);
     EXPECT_EQ(page.post("/explode"), 404);
   }
-  config.may_start = true;
   {
-    Served page(config);
+    Served page([](PageConfig& config) { config.may_start = true; });
     EXPECT_EQ(page.post(start_path()), 202);
     EXPECT_EQ(page.take_wishes().hold, false);
     EXPECT_EQ(page.post("/hold"), 202);
     EXPECT_EQ(page.post(start_path()), 202);
     EXPECT_EQ(page.take_wishes().hold, true);  // of two in a tick
   }
-  config.has_loop = false;
-  EXPECT_EQ(Served(config).post(start_path()), 403);
-  EXPECT_EQ(Served(config).post("/hold"), 403);
+  const Served loopless([](PageConfig& config) { config.may_start = true, config.has_loop = false; });
+  EXPECT_EQ(loopless.post(start_path()), 403);
+  EXPECT_EQ(loopless.post("/hold"), 403);
 }
 
 // The network or a stopped process may delay it: its sender does not expect it any more.
 TEST(LivePage, StartsNothingLate) {
-  PageConfig config = config_of_test();
-  config.may_start = true;
-  Served page(config);
+  Served page([](PageConfig& config) { config.may_start = true; });
   for (const std::string& path : {start_path(1.1), start_path(100), start_path(-100)})
     EXPECT_EQ(page.post(path), 409) << path;
   for (const char* path : {"/start", "/start?at=", "/start?at=now", "/start?at=nan", "/start?at=inf"})
@@ -195,19 +196,17 @@ TEST(LivePage, StartsNothingLate) {
 }
 
 TEST(LivePage, TakesAPixelForTheTipWhereItMay) {
-  PageConfig config = config_of_test();
   const Rig rig = testing::small_test_rig();
   const auto path = [](const std::string& u, const std::string& v, double ago_s = 0, const std::string& image = "1") {
     return "/tip?u=" + u + "&v=" + v + "&image=" + image + "&" + start_path(ago_s).substr(7);
   };
   {
-    Served page(config);
+    Served page;
     page.show(image_of(rig, 90));
     EXPECT_EQ(page.post(path("3", "4")), 403);
     EXPECT_FALSE(page.take_wishes().tip);
   }
-  config.takes_tip_goals = true;
-  Served page(config);
+  Served page([](PageConfig& config) { config.takes_tip_goals = true; });
   EXPECT_EQ(page.post(path("3", "4")), 400) << "there is no image yet";
   page.show(image_of(rig, 90));
   EXPECT_EQ(page.post(path("3", "4")), 202);
@@ -236,10 +235,8 @@ TEST(LivePage, TakesAPixelForTheTipWhereItMay) {
 
 // Without an answer in time, a pressed button is a released one.
 TEST(LivePage, TheRunButtonIsPressedWhileThePageSaysSo) {
-  PageConfig config = config_of_test();
-  EXPECT_EQ(Served(config).post(press_path()), 404);
-  config.has_run_button = true;
-  Served page(config);
+  EXPECT_EQ(Served().post(press_path()), 404);
+  Served page([](PageConfig& config) { config.has_run_button = true; });
   const auto press = [&](double ago_s = 0) { return page.post(press_path(ago_s)); };
   EXPECT_FALSE(page.operator_present());
   EXPECT_EQ(press(), 202);
@@ -264,9 +261,7 @@ TEST(LivePage, TheRunButtonIsPressedWhileThePageSaysSo) {
 }
 
 TEST(LivePage, RefusesStrangersAndOtherSites) {
-  PageConfig config = config_of_test();
-  config.address = "0.0.0.0";
-  Served page(config);
+  Served page([](PageConfig& config) { config.address = "0.0.0.0"; });
   const std::string url = page.url();
   const std::string token = url.substr(url.find("token=") + 6);
   for (const char* path : {"/", "/page.js", "/state", "/picture", "/?token=", "/?token=abc"})
@@ -326,11 +321,9 @@ Crowd crowd_of(const Served& page, std::size_t count, const std::string& saying 
 
 // By the limits as they are.
 TEST(LivePage, WhoSaysNothingKeepsNobodyFromTheButtons) {
-  PageConfig config = config_of_test();
-  config.limits = HttpLimits();
   for (const std::string& saying : {std::string(), std::string("GET / HTTP/1.1\r\nHost:")})
     for (const std::size_t count : {24u, 200u}) {
-      Served page(config);
+      Served page([](PageConfig& config) { config.limits = HttpLimits(); });
       const Crowd crowd = crowd_of(page, count, saying);
       const auto begin = std::chrono::steady_clock::now();
       EXPECT_EQ(page.get("/"), 200) << count;
@@ -344,11 +337,8 @@ TEST(LivePage, WhoSaysNothingKeepsNobodyFromTheButtons) {
 
 // Those that have requested something stay, up to the limit.
 TEST(LivePage, NewConnectionsEndNoneThatHasRequested) {
-  PageConfig config = config_of_test();
-  config.limits.connections_per_address = 4;
-  config.limits.head_s = 60;
-  Served page(config);
-  const std::string question = fmt::format("GET /state HTTP/1.1\r\nHost: 127.0.0.1:{}\r\n", page.port);
+  Served page([](PageConfig& config) { config.limits.connections_per_address = 4, config.limits.head_s = 60; });
+  const std::string question = page.question("/state");
   Crowd asking;
   for (int i = 0; i < 4; ++i) {
     asking.push_back(std::move(crowd_of(page, 1, question + "\r\n").front()));
@@ -365,12 +355,9 @@ TEST(LivePage, NewConnectionsEndNoneThatHasRequested) {
 
 TEST(LivePage, WaitsLongerForTheNextRequestThanForTheFirst) {
   EXPECT_LE(HttpLimits{}.first_s, 1);
-  PageConfig config = config_of_test();
-  config.limits.first_s = 0.1;
-  config.limits.head_s = 60;
-  Served page(config);
+  Served page([](PageConfig& config) { config.limits.first_s = 0.1, config.limits.head_s = 60; });
   const RawConnection silent(page.port), asking(page.port);
-  const std::string question = fmt::format("GET /state HTTP/1.1\r\nHost: 127.0.0.1:{}\r\n", page.port);
+  const std::string question = page.question("/state");
   asking.say(question + "\r\n");
   const auto begin = std::chrono::steady_clock::now();
   EXPECT_EQ(silent.hear(), "");
@@ -384,7 +371,7 @@ TEST(LivePage, WaitsLongerForTheNextRequestThanForTheFirst) {
 TEST(LivePage, AThousandConnectionsLeaveTheLoopAlone) {
   const Rig rig = testing::small_test_rig();
   Served page;
-  std::vector<std::unique_ptr<RawConnection>> crowd;
+  Crowd crowd;
   std::chrono::steady_clock::duration longest{};
   const auto take_time = [&longest](const std::function<void()>& call) {
     const auto begin = std::chrono::steady_clock::now();
@@ -422,14 +409,12 @@ TEST(LivePage, SaysWhereItCanNotListen) {
 
 // Viewers that wait when the run ends keep nobody.
 TEST(LivePage, EndsWhileSomebodyWaits) {
-  PageConfig config = config_of_test();
-  config.limits.patience_s = 60;
   std::optional<RawConnection> viewer;
   std::chrono::steady_clock::time_point begin;
   {
-    Served page(config);
+    Served page([](PageConfig& config) { config.limits.patience_s = 60; });
     viewer.emplace(page.port);
-    viewer->say(fmt::format("GET /picture HTTP/1.1\r\nHost: 127.0.0.1:{}\r\n\r\n", page.port));
+    viewer->say(page.question("/picture") + "\r\n");
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
     begin = std::chrono::steady_clock::now();
   }

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <ros/serialization.h>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -86,43 +87,34 @@ TEST(Ros1Messages, CarryTheTypesSums) {
 }
 
 TEST(Ros1Messages, TellOfTheLoop) {
+  constexpr std::uint32_t second = 1700000000;
   PoseMessage pose{stamp_s, "endoscope", {1, 2, 3}, {0, 0.6, 0, 0.8}, {}};
   pose.covariance[7] = 5;
   const auto pose_wire = ros1_message(pose);
-  EXPECT_EQ(pose_wire.header.stamp.sec, 1700000000u);
-  EXPECT_EQ(pose_wire.header.frame_id, "endoscope");
-  EXPECT_EQ(pose_wire.pose.pose.position.z, 3);
-  EXPECT_EQ(pose_wire.pose.pose.orientation.w, 0.8);
-  EXPECT_EQ(pose_wire.pose.covariance[7], 5);
+  EXPECT_EQ(std::tuple(pose_wire.header.stamp.sec, pose_wire.header.frame_id, pose_wire.pose.pose.position.z,
+                       pose_wire.pose.pose.orientation.w, pose_wire.pose.covariance[7]),
+            std::tuple(second, "endoscope", 3, 0.8, 5));
 
   const Rigid3 place{Eigen::Quaterniond(0.8, 0, 0.6, 0), {1, 2, 3}};
   const auto place_wire = ros1_message(PlaceMessage{stamp_s, "camera", place});
-  EXPECT_EQ(place_wire.header.frame_id, "camera");
-  EXPECT_EQ(place_wire.pose.position.z, 3);
-  EXPECT_EQ(place_wire.pose.orientation.y, 0.6);
+  EXPECT_EQ(std::tuple(place_wire.header.frame_id, place_wire.pose.position.z, place_wire.pose.orientation.y),
+            std::tuple("camera", 3, 0.6));
   const auto frames_wire = ros1_message(TransformsMessage{stamp_s, {{"a", "b", {}}, {"c", "d", place}}});
   ASSERT_EQ(frames_wire.transforms.size(), 2u);
-  EXPECT_EQ(frames_wire.transforms[1].header.stamp.sec, 1700000000u);
-  EXPECT_EQ(frames_wire.transforms[1].header.frame_id, "c");
-  EXPECT_EQ(frames_wire.transforms[1].child_frame_id, "d");
-  EXPECT_EQ(frames_wire.transforms[1].transform.rotation.w, 0.8);
+  const auto& frame = frames_wire.transforms[1];
+  EXPECT_EQ(std::tuple(frame.header.stamp.sec, frame.header.frame_id, frame.child_frame_id, frame.transform.rotation.w),
+            std::tuple(second, "c", "d", 0.8));
   const auto band_wire =
       ros1_message(CylindersMessage{stamp_s, "endoscope", "PSM1", {{}, {place, 0.5, 0.25, {1, 0.5, 0.25, 0.125}}}});
   const auto& band = band_wire.markers.at(1);
-  EXPECT_EQ(band.ns, "PSM1");
-  EXPECT_EQ(band.id, 1);
-  EXPECT_EQ(band.type, 3);
-  EXPECT_EQ(band.scale.x, 0.5);
-  EXPECT_EQ(band.scale.z, 0.25);
-  EXPECT_EQ(band.color.a, 0.125f);
-  EXPECT_EQ(band.lifetime.toSec(), 0.5);
+  EXPECT_EQ(std::tuple(band.ns, band.id, band.type, band.scale.x, band.scale.z, band.color.a, band.lifetime.toSec()),
+            std::tuple("PSM1", 1, 3, 0.5, 0.25, 0.125f, 0.5));
   // ros/common_msgs' and ros/geometry2's own.
   EXPECT_STREQ(ros::message_traits::md5sum<ros1::MarkerArray>(), "d155b9ce5188fbaf89745847fd5882d7");
   EXPECT_STREQ(ros::message_traits::md5sum<ros1::TFMessage>(), "94810edda583a504dfda3829e70d7eec");
 
-  const DiagnosticMessage state{
-      stamp_s, DiagnosticMessage::Level::warning, "lapservo", "hold", {{"reason", "outlier"}}};
-  const auto state_wire = ros1_message(state);
+  const auto state_wire = ros1_message(
+      DiagnosticMessage{stamp_s, DiagnosticMessage::Level::warning, "lapservo", "hold", {{"reason", "outlier"}}});
   ASSERT_EQ(state_wire.status.size(), 1u);
   EXPECT_EQ(state_wire.status[0].level, 1);
   EXPECT_EQ(state_wire.status[0].values.at(0).value, "outlier");
@@ -133,17 +125,14 @@ TEST(Ros1Messages, TellOfTheLoop) {
   seen.feature_covariance[15] = 6;
   seen.error[3] = 7;
   const auto seen_wire = ros1_message(seen);
-  EXPECT_EQ(seen_wire.status, "ok");
-  EXPECT_EQ(seen_wire.q[3], 4);
-  EXPECT_EQ(seen_wire.feature_covariance[15], 6);
-  EXPECT_EQ(seen_wire.error[3], 7);
+  EXPECT_EQ(std::tuple(seen_wire.status, seen_wire.q[3], seen_wire.feature_covariance[15], seen_wire.error[3]),
+            std::tuple("ok", 4, 6, 7));
 
   const CameraInfoMessage camera{stamp_s, 640, 360, {1, 2, 3, 4, 5}, {550, 0, 319.5, 0, 551, 179.5, 0, 0, 1}, "e"};
   const auto camera_wire = ros1_message(camera);
-  EXPECT_EQ(camera_wire.header.frame_id, "e");
-  EXPECT_EQ(camera_wire.distortion_model, "plumb_bob");
-  EXPECT_EQ(camera_wire.D.at(4), 5);
-  EXPECT_EQ(camera_wire.K[4], 551);
+  EXPECT_EQ(
+      std::tuple(camera_wire.header.frame_id, camera_wire.distortion_model, camera_wire.D.at(4), camera_wire.K[4]),
+      std::tuple("e", "plumb_bob", 5, 551));
   const std::array<double, 12> p{550, 0, 319.5, 0, 0, 551, 179.5, 0, 0, 0, 1, 0};
   for (std::size_t i = 0; i < p.size(); ++i) EXPECT_EQ(camera_wire.P[i], p[i]) << i;
 }

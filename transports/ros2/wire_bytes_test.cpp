@@ -1,7 +1,6 @@
 // The bytes on the wire, read by eProsima's Fast CDR, which ROS 2's nodes use by default, along the .msg files: every
 // field has its number, in its place, and nothing is left over.
 
-#include <cstdlib>
 #include <dds/ddsi/ddsi_serdata.h>
 #include <fstream>
 #include <limits>
@@ -16,7 +15,7 @@
 #include "lapservo/testing/fast_cdr.h"
 #include "lapservo/testing/sample_frames.h"
 #include "transports/ros2/dds_node.h"
-#include "transports/ros2/ros2_names.h"
+#include "transports/ros2/test_dds_peer.h"
 #include "transports/ros2/wire.h"
 
 namespace lapservo::internal {
@@ -61,23 +60,15 @@ class MessageReader {
     for (std::uint32_t i = 0; i < count; ++i) read_value(type, package, fmt::format("{}[{}]", name, i));
   }
   void read_value(const std::string& type, const std::string& package, const std::string& name) {
-    if (type == "float64") {
-      fields_[name] = fmt::format("{}", number<double>());
-    } else if (type == "float32") {
-      fields_[name] = fmt::format("{}", number<float>());
-    } else if (type == "int32") {
-      fields_[name] = fmt::format("{}", number<std::int32_t>());
-    } else if (type == "uint32") {
-      fields_[name] = fmt::format("{}", number<std::uint32_t>());
-    } else if (type == "uint8" || type == "byte") {
-      fields_[name] = fmt::format("{}", number<std::uint8_t>());
-    } else if (type == "bool") {
-      fields_[name] = fmt::format("{}", number<bool>());
-    } else if (type == "string") {
-      fields_[name] = number<std::string>();
-    } else {
-      read_message(type.find('/') == std::string::npos ? package + "/" + type : type, name + ".");
-    }
+    const auto set = [&](const auto& value) { fields_[name] = fmt::format("{}", value); };
+    if (type == "float64") return set(number<double>());
+    if (type == "float32") return set(number<float>());
+    if (type == "int32") return set(number<std::int32_t>());
+    if (type == "uint32") return set(number<std::uint32_t>());
+    if (type == "uint8" || type == "byte") return set(number<std::uint8_t>());
+    if (type == "bool") return set(number<bool>());
+    if (type == "string") return set(number<std::string>());
+    read_message(type.find('/') == std::string::npos ? package + "/" + type : type, name + ".");
   }
   template <typename T>
   T number() {
@@ -95,8 +86,7 @@ class MessageReader {
 // As DDS sends them. Writer and reader are of one process, and wait for nobody.
 template <typename Message>
 std::vector<char> sent(const Message& message) {
-  const char* const domain = std::getenv("ROS_DOMAIN_ID");
-  const DdsNode node("wire_bytes", domain_id(domain ? domain : ""));
+  const DdsNode node("wire_bytes", test_domain());
   const dds_entity_t participant = node.participant();
   const dds_entity_t topic =
       dds_create_topic(participant, &Wire<Message>::descriptor(), "wire_bytes", nullptr, nullptr);
