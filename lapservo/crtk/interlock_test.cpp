@@ -26,9 +26,10 @@ Joints psm() {
   return {{"yaw", "pitch", "insertion", "roll"}, {1, -1, 1, 1}, {0, 1.5707963, -0.0156, 0}};
 }
 
-InterlockConfig config_of(bool motion_enabled = true) {
+InterlockConfig config_of(bool motion_enabled = true, const std::vector<std::string>& wrist = {}) {
   InterlockConfig config;
   config.joints = psm();
+  config.wrist = wrist;
   config.motion_enabled = motion_enabled;
   return config;
 }
@@ -170,9 +171,7 @@ TEST(Interlock, FollowsFromTheArmsOwnSetPointOn) {
 
 // Somebody else moves it, through the arm's own setpoint; neither ends the motion of the four.
 TEST(Interlock, TheWristPassesThrough) {
-  InterlockConfig config = config_of();
-  config.wrist = {"outer_wrist"};  // by the name before dVRK 2.3
-  Bench bench(config);
+  Bench bench(config_of(true, {"outer_wrist"}));  // by the name before dVRK 2.3
   bench.control(0.2, slow);
   bench.wrist_behind = 1e-2;  // until the arm says so
   double fastest_rad = 0;
@@ -196,9 +195,7 @@ TEST(Interlock, TheWristPassesThrough) {
 
 // Sent back, the arm's rounding would add up.
 TEST(Interlock, AWristThatTheArmRoundsStaysWhereItWas) {
-  InterlockConfig config = config_of();
-  config.wrist = {"wrist"};
-  Bench bench(config);
+  Bench bench(config_of(true, {"wrist"}));
   bench.control(0.2, slow);
   const double before = bench.wrist;
   bench.wrist_behind = 3.1e-3;
@@ -208,13 +205,10 @@ TEST(Interlock, AWristThatTheArmRoundsStaysWhereItWas) {
 }
 
 TEST(Interlock, ReportsTheWristOfTheTool) {
-  InterlockConfig config = config_of();
-  config.wrist = {"outer_wrist"};
-  Bench bench(config);
+  Bench bench(config_of(true, {"outer_wrist"}));
   bench.pass(0.1);
   EXPECT_EQ(bench.interlock.state(bench.now_s).wrist_rad, std::vector<double>{bench.wrist});
-  config.wrist = {"wrist", "jaw"};
-  Bench without(config);
+  Bench without(config_of(true, {"wrist", "jaw"}));
   without.pass(0.1);
   EXPECT_TRUE(without.interlock.state(without.now_s).wrist_rad.empty());
 }

@@ -53,6 +53,11 @@ cv::Mat even_background(const Camera& camera, float light) {
   return {camera.height_px, camera.width_px, CV_32FC3, cv::Scalar::all(light)};
 }
 
+// Without noise, before an even background.
+Renderer renderer_of(const std::vector<ShaftModel>& shafts, float light = 0.1F, const Camera& camera = small_camera()) {
+  return {camera, shafts, even_background(camera, light), quiet()};
+}
+
 double max_difference(const cv::Mat& a, const cv::Mat& b) {
   return cv::norm(a, b, cv::NORM_INF);
 }
@@ -69,7 +74,7 @@ TEST(Renderer, BoundariesLieWhereKinematicsSays) {
   distorting.distortion = {-0.28, 0.09, 0.0006, -0.0004, 0};
   for (const auto& [camera, shaft] : {std::pair(small_camera(), short_shaft()), std::pair(distorting, short_shaft()),
                                       std::pair(small_camera(), askew_shaft(1.4e-3, 0.24))}) {
-    Renderer renderer(camera, {shaft}, even_background(camera, 0.1F), quiet());
+    Renderer renderer = renderer_of({shaft}, 0.1F, camera);
     int checked = 0;
     for (int trial = 0; trial < 30; ++trial) {
       const ShaftPlacement placement = across_the_view(random.uniform(-pi, pi), random.uniform(-pi, pi));
@@ -95,8 +100,7 @@ TEST(Renderer, TheShaftShowsInTheGap) {
   const Camera camera = small_camera();
   for (const double gap_rad : {0.3, 0.03}) {
     const ShaftModel shaft = askew_shaft(0, gap_rad);
-    Renderer renderer(camera, {shaft}, even_background(camera, 0.1F), quiet()),
-        without(camera, {short_shaft()}, even_background(camera, 0.1F), quiet());
+    Renderer renderer = renderer_of({shaft}), without = renderer_of({short_shaft()});
     ShaftPlacement placement = across_the_view(0.3, 0);
     const auto facing = centre_line(camera, shaft.marker, placement.camera_from_unrolled, 0).value();
     placement.psi_rad = facing.tau_rad + gap_rad / 2;  // the gap's middle faces the camera
@@ -112,9 +116,7 @@ TEST(Renderer, TheShaftShowsInTheGap) {
 
 // Both ways of tracing rays agree where both can.
 TEST(Renderer, APrintAskewByNothingIsASquareOne) {
-  const Camera camera = small_camera();
-  Renderer square(camera, {short_shaft()}, even_background(camera, 0.1F), quiet());
-  Renderer askew(camera, {askew_shaft(1e-12, 0)}, even_background(camera, 0.1F), quiet());
+  Renderer square = renderer_of({short_shaft()}), askew = renderer_of({askew_shaft(1e-12, 0)});
   Random random(16);
   for (int trial = 0; trial < 10; ++trial) {
     const ShaftPlacement placement = across_the_view(random.uniform(-pi, pi), random.uniform(-pi, pi));
@@ -144,8 +146,8 @@ TEST(Renderer, ASubPixelShiftMovesTheLightByAsMuch) {
     Camera moved = camera;
     moved.cx_px += shift_px.x();
     moved.cy_px += shift_px.y();
-    Renderer renderer(moved, {short_shaft()}, even_background(moved, 0), quiet());
-    const cv::Mat light = light_of(renderer.render({across_the_view(turn_rad, 0.8)}, 1), camera.response);
+    const cv::Mat bgr = renderer_of({short_shaft()}, 0, moved).render({across_the_view(turn_rad, 0.8)}, 1);
+    const cv::Mat light = light_of(bgr, camera.response);
     Eigen::Vector2d moment = Eigen::Vector2d::Zero();
     double weight = 0;
     for (int v = 0; v < light.rows; ++v)
@@ -197,12 +199,10 @@ TEST(Renderer, MotionBlurIsTheMeanOfItsMoments) {
 }
 
 TEST(Renderer, TheNearerShaftHidesTheFarther) {
-  const Camera camera = small_camera();
   const ShaftPlacement near = across_the_view(0.2, 1, 0.08), far = across_the_view(1.6, 2, 0.13);
-  Renderer both(camera, {short_shaft(), short_shaft()}, even_background(camera, 0.1F), quiet());
+  Renderer both = renderer_of({short_shaft(), short_shaft()});
   const cv::Mat a = both.render({near, far}, 1), b = both.render({far, near}, 1);
-  Renderer alone(camera, {short_shaft()}, even_background(camera, 0.1F), quiet());
-  const cv::Mat only_near = alone.render({near}, 1);
+  const cv::Mat only_near = renderer_of({short_shaft()}).render({near}, 1);
   const cv::Rect middle(230, 150, 20, 20);
   EXPECT_LE(max_difference(a(middle), only_near(middle)), 1);
   EXPECT_LE(max_difference(b(middle), only_near(middle)), 1);
@@ -225,8 +225,7 @@ ShaftModel shaft_with_tool() {
 TEST(Renderer, AToolEndsWhereItsKinematicsSay) {
   const Camera camera = small_camera();
   const ShaftModel with = shaft_with_tool();
-  Renderer renderer(camera, {with}, even_background(camera, 0.9F), quiet()),
-      bare(camera, {short_shaft()}, even_background(camera, 0.9F), quiet());
+  Renderer renderer = renderer_of({with}, 0.9F), bare = renderer_of({short_shaft()}, 0.9F);
   Random random(17);
   int shown = 0;
   for (int trial = 0; trial < 60; ++trial) {
@@ -269,7 +268,7 @@ TEST(Renderer, AToolHidesTheMarkerOnlyWhereItIsInFrontOfIt) {
     const Rigid3 pose = camera_from_marker(shaft.marker, placement.camera_from_unrolled, placement.psi_rad);
     const Eigen::Vector3d camera_in_marker_m = pose.inverse().translation;
     const Eigen::Vector3d towards(camera_in_marker_m.x(), camera_in_marker_m.y(), 0);
-    const cv::Mat bare = Renderer(camera, {shaft}, even_background(camera, 0.1F), quiet()).render({placement}, 1);
+    const cv::Mat bare = renderer_of({shaft}).render({placement}, 1);
     const auto over_marker = [&](double side) {
       Tool& tool = shaft.tool.emplace();
       tool.wrist = {{.name = "wrist"}};
@@ -279,8 +278,7 @@ TEST(Renderer, AToolHidesTheMarkerOnlyWhereItIsInFrontOfIt) {
           pose * (tool.place->base_in_marker_m + tool.last_from_tip.translation - side * 0.001 * towards.normalized());
       const Eigen::Vector2d tip_px = camera.ideal_from_point(tip_m);
       const cv::Rect around(static_cast<int>(tip_px.x()) - 2, static_cast<int>(tip_px.y()) - 2, 5, 5);
-      const cv::Mat image = Renderer(camera, {shaft}, even_background(camera, 0.1F), quiet()).render({placement}, 1);
-      return max_difference(image(around), bare(around));
+      return max_difference(renderer_of({shaft}).render({placement}, 1)(around), bare(around));
     };
     EXPECT_GT(over_marker(1), 30) << trial;
     EXPECT_EQ(over_marker(-1), 0) << trial;

@@ -134,26 +134,27 @@ TEST(Transfer, OfCamerasIsTheRigsAndOthersAreRefused) {
   }
 }
 
+std::vector<std::uint8_t> big_endian(std::uint32_t value) {
+  std::vector<std::uint8_t> bytes;
+  for (const int shift : {24, 16, 8, 0}) bytes.push_back(static_cast<std::uint8_t>(value >> shift));
+  return bytes;
+}
+
 // A chunk after a PNG's header.
 std::vector<std::uint8_t> with_chunk(std::vector<std::uint8_t> png, const std::string& name,
                                      const std::vector<std::uint8_t>& content) {
   std::vector<std::uint8_t> chunk(name.begin(), name.end());
   chunk.insert(chunk.end(), content.begin(), content.end());
-  const auto sum = crc32(0, chunk.data(), static_cast<uInt>(chunk.size()));
-  const auto length = static_cast<std::uint32_t>(content.size());
-  std::vector<std::uint8_t> whole;
-  for (const int shift : {24, 16, 8, 0}) whole.push_back(static_cast<std::uint8_t>(length >> shift));
-  whole.insert(whole.end(), chunk.begin(), chunk.end());
-  for (const int shift : {24, 16, 8, 0}) whole.push_back(static_cast<std::uint8_t>(sum >> shift));
+  const auto sum = big_endian(static_cast<std::uint32_t>(crc32(0, chunk.data(), static_cast<uInt>(chunk.size()))));
+  auto whole = big_endian(static_cast<std::uint32_t>(content.size()));
+  for (const auto& part : {chunk, sum}) whole.insert(whole.end(), part.begin(), part.end());
   constexpr std::ptrdiff_t header = 33;
   png.insert(png.begin() + header, whole.begin(), whole.end());
   return png;
 }
 
 std::vector<std::uint8_t> gamma_chunk(double gamma) {
-  const auto value = static_cast<std::uint32_t>(std::lround(1e5 / gamma));
-  return {static_cast<std::uint8_t>(value >> 24), static_cast<std::uint8_t>(value >> 16),
-          static_cast<std::uint8_t>(value >> 8), static_cast<std::uint8_t>(value)};
+  return big_endian(static_cast<std::uint32_t>(std::lround(1e5 / gamma)));
 }
 
 TEST(Transfer, OfAPngIsUndone) {
