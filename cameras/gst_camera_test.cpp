@@ -103,28 +103,22 @@ TEST(GstCamera, ADevicesRawAndJpegImagesHaveTheirColours) {
 TEST(GstCamera, WhatGivesNoImagesIsRefusedInOneLine) {
   struct Refusal {
     std::string camera;
-    cv::Size size;
-    std::vector<std::string> said;
+    std::vector<std::string> said{"expected a pipeline"};
+    cv::Size size{};
   };
-  for (const auto& [camera, size, said] :
+  for (const Refusal& one :
        {Refusal{"gst:nosuchelement",
-                {},
                 {"gst:nosuchelement: gives no images (no element \"nosuchelement\"", "plugins-good"}},
-        {"gst:filesrc location=/nowhere ! decodebin", {}, {"(filesrc", "No such file", "expected a pipeline"}},
-        {"gst:videotestsrc ! video/x-raw,format=nosuch", {}, {"expected a pipeline"}},
-        {"gst:", {}, {"expected a pipeline"}},
-        {"gst:!", {}, {"expected a pipeline"}},
-        {"gst:videotestsrc ! fakesink", {}, {"expected a pipeline"}},
-        {"gst:audiotestsrc", {}, {"expected a pipeline"}},
-        {"gst:videotestsrc pattern=nosuch", {}, {"expected a pipeline"}},
-        {"/dev/video-none",
-         {},
-         {"/dev/video-none: gives no images (v4l2src", "No such file", "plugged in", "group video"}},
-        {"/dev/video-none", {640, 480}, {"and that gives 640x480 as in the rig"}},
-        {"/dev/video/../null", {}, {"expected a camera"}}}) {
-    const std::string refusal =
-        testing::input_error([&, &camera = camera, &size = size] { open_camera(camera, size); });
-    for (const std::string& part : said) EXPECT_NE(refusal.find(part), std::string::npos) << camera << ": " << refusal;
+        Refusal{"gst:filesrc location=/nowhere ! decodebin", {"(filesrc", "No such file", "expected a pipeline"}},
+        Refusal{"gst:videotestsrc ! video/x-raw,format=nosuch"}, Refusal{"gst:"}, Refusal{"gst:!"},
+        Refusal{"gst:videotestsrc ! fakesink"}, Refusal{"gst:audiotestsrc"}, Refusal{"gst:videotestsrc pattern=nosuch"},
+        Refusal{"/dev/video-none",
+                {"/dev/video-none: gives no images (v4l2src", "No such file", "plugged in", "group video"}},
+        Refusal{"/dev/video-none", {"and that gives 640x480 as in the rig"}, {640, 480}},
+        Refusal{"/dev/video/../null", {"expected a camera"}}}) {
+    const std::string refusal = testing::input_error([&] { open_camera(one.camera, one.size); });
+    for (const std::string& part : one.said)
+      EXPECT_NE(refusal.find(part), std::string::npos) << one.camera << ": " << refusal;
     EXPECT_EQ(refusal.find('\n'), std::string::npos) << refusal;
   }
 }

@@ -92,7 +92,6 @@ cv::Mat shades() {
 }
 
 TEST(Image, ThatItsDecoderComplainsOfIsDamaged) {
-  Random random(seed);
   const Bytes jpeg = encoded(shades(), ".jpg");
   EXPECT_FALSE(decode_picture(jpeg, "p").flaw);
   Bytes shortened = jpeg;  // the last quarter of the scan is gone, but the end marker is there

@@ -55,14 +55,14 @@ inline bool ffmpeg(const std::string& arguments) {
   return std::system(("ffmpeg -v quiet -y " + arguments).c_str()) == 0;
 }
 
-/// An image as a video of 25 frames a second, with these arguments for its output; see ffmpeg().
+/// An image of 8 or 16 bits as a video of 25 frames a second, with these arguments for its output; see ffmpeg().
 inline bool write_by_ffmpeg(const std::filesystem::path& path, const cv::Mat& bgr, const std::string& arguments,
                             int frames = 1) {
   const TemporaryFolder folder;
   write_file(folder / "raw", {reinterpret_cast<const char*>(bgr.data), bgr.total() * bgr.elemSize()});
-  const std::string input = "-stream_loop " + std::to_string(frames - 1) + " -f rawvideo -pix_fmt bgr24 -s " +
-                            std::to_string(bgr.cols) + "x" + std::to_string(bgr.rows) + " -r 25 -i '" +
-                            (folder / "raw").string() + "' ";
+  const std::string input = "-stream_loop " + std::to_string(frames - 1) + " -f rawvideo -pix_fmt " +
+                            (bgr.depth() == CV_16U ? "bgr48le" : "bgr24") + " -s " + std::to_string(bgr.cols) + "x" +
+                            std::to_string(bgr.rows) + " -r 25 -i '" + (folder / "raw").string() + "' ";
   return ffmpeg(input + arguments + " '" + path.string() + "'");
 }
 

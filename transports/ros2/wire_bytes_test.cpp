@@ -125,23 +125,22 @@ void expect_fields(const Fields& found, const std::string& expected) {
 }
 
 constexpr double stamp_s = 1700000000.25;
-const std::string stamp = "header.stamp.sec 1700000000, header.stamp.nanosec 250000000";
+const std::string stamp = "header.stamp.sec 1700000000, header.stamp.nanosec 250000000, ";
 
 TEST(WireBytes, OfWhatSteersAnArm) {
   const Fields joints =
       sent_as("sensor_msgs/JointState", JointMessage{stamp_s, {"yaw", "", "pitch"}, {0.25, -1.5, 1e-300}, {4, 5, 6}});
-  expect_fields(joints, stamp);
   expect_fields(joints,
-                "header.frame_id , name 3 of them, name[0] yaw, name[1] , name[2] pitch, position 3 of them, "
-                "position[0] 0.25, position[1] -1.5, position[2] 1e-300, velocity 3 of them, velocity[2] 6, "
-                "effort 0 of them");
+                stamp +
+                    "header.frame_id , name 3 of them, name[0] yaw, name[1] , name[2] pitch, position 3 of them, "
+                    "position[0] 0.25, position[1] -1.5, position[2] 1e-300, velocity 3 of them, velocity[2] 6, "
+                    "effort 0 of them");
   const TrajectoryMessage trajectory{stamp_s, {"s_rad", "r_px"}, {{0, {1, 2}}, {2.25, {3, 4}}}};
   expect_fields(sent_as("trajectory_msgs/JointTrajectory", trajectory),
                 "joint_names[1] r_px, points 2 of them, points[0].velocities 0 of them, points[1].positions[1] 4, "
                 "points[1].time_from_start.sec 2, points[1].time_from_start.nanosec 250000000");
-  const Fields state = sent_as("crtk_msgs/OperatingState", OperatingStateMessage{stamp_s, "ENABLED", true, false});
-  expect_fields(state, stamp);
-  expect_fields(state, "state ENABLED, is_homed true, is_busy false");
+  expect_fields(sent_as("crtk_msgs/OperatingState", OperatingStateMessage{stamp_s, "ENABLED", true, false}),
+                stamp + "state ENABLED, is_homed true, is_busy false");
   expect_fields(sent_as("crtk_msgs/StringStamped", StringMessage{stamp_s, "enable"}), "string enable");
   expect_fields(sent_as("std_msgs/Bool", BoolMessage{true}), "data true");
 }
@@ -149,30 +148,28 @@ TEST(WireBytes, OfWhatSteersAnArm) {
 TEST(WireBytes, OfPictures) {
   const Fields image =
       sent_as("sensor_msgs/Image", ImageMessage{stamp_s, 2, 1, 7, "rgb8", true, {1, 2, 3, 4, 5, 6, 255}, 0, "e"});
-  expect_fields(image, stamp);
-  expect_fields(image, "header.frame_id e");
-  expect_fields(image, "height 1, width 2, encoding rgb8, is_bigendian 1, step 7, data 7 of them, data[6] 255");
+  expect_fields(
+      image,
+      stamp +
+          "header.frame_id e, height 1, width 2, encoding rgb8, is_bigendian 1, step 7, data 7 of them, data[6] 255");
   expect_fields(sent_as("sensor_msgs/CompressedImage", CompressedImageMessage{stamp_s, "jpeg", {7, 8}, 0, "e"}),
                 "header.frame_id e, format jpeg, data 2 of them, data[1] 8");
   const CameraInfoMessage camera{stamp_s, 640, 360, {1, 2, 3, 4, 5}, {550, 0, 319.5, 0, 551, 179.5, 0, 0, 1}, "e"};
   expect_fields(sent_as("sensor_msgs/CameraInfo", camera),
                 "header.frame_id e, height 360, width 640, distortion_model plumb_bob, d 5 of them, d[4] 5, k[4] 551, "
-                "r[0] 1, r[1] 0, "
-                "p[6] 179.5, p[3] 0, binning_x 0, roi.do_rectify false");
+                "r[0] 1, r[1] 0, p[6] 179.5, p[3] 0, binning_x 0, roi.do_rectify false");
 }
 
 TEST(WireBytes, OfWhatTheLoopTells) {
   PoseMessage pose{stamp_s, "endoscope", {1, 2, 3}, {0, 0.6, 0, 0.8}, {}};
   pose.covariance[35] = 5;
-  const Fields told = sent_as("geometry_msgs/PoseWithCovarianceStamped", pose);
-  expect_fields(told, stamp);
-  expect_fields(told,
-                "header.frame_id endoscope, pose.pose.position.z 3, pose.pose.orientation.y 0.6, "
-                "pose.pose.orientation.w 0.8, pose.covariance[34] 0, pose.covariance[35] 5");
+  expect_fields(sent_as("geometry_msgs/PoseWithCovarianceStamped", pose),
+                stamp +
+                    "header.frame_id endoscope, pose.pose.position.z 3, pose.pose.orientation.y 0.6, "
+                    "pose.pose.orientation.w 0.8, pose.covariance[34] 0, pose.covariance[35] 5");
   const Rigid3 place{Eigen::Quaterniond(0.8, 0, 0.6, 0), {1, 2, 3}};
-  const Fields base = sent_as("geometry_msgs/PoseStamped", PlaceMessage{stamp_s, "camera", place});
-  expect_fields(base, stamp);
-  expect_fields(base, "header.frame_id camera, pose.position.z 3, pose.orientation.y 0.6, pose.orientation.w 0.8");
+  expect_fields(sent_as("geometry_msgs/PoseStamped", PlaceMessage{stamp_s, "camera", place}),
+                stamp + "header.frame_id camera, pose.position.z 3, pose.orientation.y 0.6, pose.orientation.w 0.8");
   expect_fields(sent_as("tf2_msgs/TFMessage", TransformsMessage{stamp_s, {{"a", "b", {}}, {"c", "d", place}}}),
                 "transforms 2 of them, transforms[0].header.stamp.sec 1700000000, transforms[1].header.frame_id c, "
                 "transforms[1].child_frame_id d, transforms[1].transform.translation.z 3, "

@@ -60,14 +60,6 @@ cv::Mat encoded(const Encoding& encoding) {
   return bgr;
 }
 
-bool write_video(const std::filesystem::path& path, const cv::Mat& bgr16, const std::string& arguments) {
-  const testing::TemporaryFolder folder;
-  testing::write_file(folder / "raw", {reinterpret_cast<const char*>(bgr16.data), bgr16.total() * bgr16.elemSize()});
-  return testing::ffmpeg("-f rawvideo -pix_fmt bgr48le -s " + std::to_string(bgr16.cols) + "x" +
-                         std::to_string(bgr16.rows) + " -r 25 -i '" + (folder / "raw").string() + "' " + arguments +
-                         " '" + path.string() + "'");
-}
-
 TEST(Transfer, OfAVideoIsUndone) {
   const testing::TemporaryFolder folder;
   struct Video {
@@ -84,11 +76,11 @@ TEST(Transfer, OfAVideoIsUndone) {
                         path = (folder / (text.find("prores") == text.npos ? "a.mkv" : "a.mov")).string();
       const std::string matrix = text.find("gbrp") == text.npos ? "bt2020nc" : "rgb";
       const std::string scale = matrix == "rgb" ? "" : "scale=out_color_matrix=bt2020:out_range=tv:flags=accurate_rnd,";
-      if (!write_video(path, encoded(video.encoding),
-                       "-vf " + scale + "setparams=color_trc=" + video.tag +
-                           (matrix == "rgb" ? "" : ":colorspace=bt2020nc") + " " + coding + " -colorspace " + matrix +
-                           " -color_trc " + video.tag + " -color_primaries bt2020 -color_range " +
-                           (matrix == "rgb" ? "pc" : "tv")))
+      if (!testing::write_by_ffmpeg(path, encoded(video.encoding),
+                                    "-vf " + scale + "setparams=color_trc=" + video.tag +
+                                        (matrix == "rgb" ? "" : ":colorspace=bt2020nc") + " " + coding +
+                                        " -colorspace " + matrix + " -color_trc " + video.tag +
+                                        " -color_primaries bt2020 -color_range " + (matrix == "rgb" ? "pc" : "tv")))
         continue;
       ++written;
       if (text.find("prores") != text.npos && std::string(video.tag) == "linear") continue;  // it has no code for that

@@ -39,12 +39,6 @@ TEST(VideoWriter, IsWholeInEveryContainerAndReplacesThroughALink) {
   VideoWriter video(folder / "link.mp4", 29.97);
   write_noise(video, 3);
   EXPECT_TRUE(fs::is_symlink(folder / "link.mp4"));
-}
-
-TEST(VideoWriter, WritesWithLosses) {
-  const TemporaryFolder folder;
-  VideoWriter video(folder / "a.mp4", 30);
-  write_noise(video, 3);
   EXPECT_TRUE(open_frame_source((folder / "a.mp4").string(), 25)->is_lossy());
 }
 
