@@ -153,9 +153,8 @@ TEST(Session, ThatIsDamagedIsReadOrRefused) {
     }
     testing::write_file(folder.path() / name, whole);
   }
-  EXPECT_NE(
-      input_error([&] { Session(folder.path().string(), "room", {}); }).find("has 0 video streams of the name room"),
-      std::string::npos);
+  const std::string none = input_error([&] { Session(folder.path().string(), "room", {}); });
+  EXPECT_NE(none.find("has 0 video streams of the name room"), std::string::npos) << none;
 }
 
 }  // namespace session_test

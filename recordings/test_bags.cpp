@@ -44,15 +44,13 @@ std::vector<std::uint8_t> written(double stamp_s, bool big_endian, const Fields&
 
 }  // namespace
 
-std::vector<std::uint8_t> ros1_bytes(const JointMessage& message) {
+template <typename Message>
+std::vector<std::uint8_t> ros1_bytes(const Message& message) {
   return bytes_of(ros1_message(message));
 }
-std::vector<std::uint8_t> ros1_bytes(const ImageMessage& message) {
-  return bytes_of(ros1_message(message));
-}
-std::vector<std::uint8_t> ros1_bytes(const CompressedImageMessage& message) {
-  return bytes_of(ros1_message(message));
-}
+template std::vector<std::uint8_t> ros1_bytes(const JointMessage&);
+template std::vector<std::uint8_t> ros1_bytes(const ImageMessage&);
+template std::vector<std::uint8_t> ros1_bytes(const CompressedImageMessage&);
 
 std::vector<std::uint8_t> cdr_bytes(const JointMessage& message, bool big_endian) {
   const std::vector<double> velocities(message.positions.size(), 0.5), no_efforts;

@@ -22,9 +22,8 @@ struct BagEntry {
 };
 
 /// As roscpp writes them.
-std::vector<std::uint8_t> ros1_bytes(const internal::JointMessage& message);
-std::vector<std::uint8_t> ros1_bytes(const internal::ImageMessage& message);
-std::vector<std::uint8_t> ros1_bytes(const internal::CompressedImageMessage& message);
+template <typename Message>
+std::vector<std::uint8_t> ros1_bytes(const Message& message);
 
 /// As Fast CDR writes them.
 std::vector<std::uint8_t> cdr_bytes(const internal::JointMessage& message, bool big_endian = false);

@@ -11,13 +11,6 @@
 namespace lapservo::internal {
 namespace {
 
-// As far on as the messages are.
-struct MessageClock : Clock {
-  double now = 0;
-  double now_s() const override { return now; }
-  void sleep_until(double) override {}
-};
-
 class ArmPoseTest : public ::testing::Test {
  protected:
   // From a computer whose clock is 100 s ahead, 10 ms on its way.
@@ -28,7 +21,7 @@ class ArmPoseTest : public ::testing::Test {
   static Rigid3 at(double x) { return {Eigen::Quaterniond::Identity(), {x, 0, 0}}; }
 
   TestTransport transport_;
-  MessageClock clock_;
+  StandingClock clock_;  // as far on as the messages are
 };
 
 TEST_F(ArmPoseTest, IsTheArmsOwnWhereThereIsOne) {

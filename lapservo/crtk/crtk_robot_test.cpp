@@ -1,6 +1,5 @@
 #include "lapservo/crtk/crtk_robot.h"
 
-#include <atomic>
 #include <cstdint>
 #include <filesystem>
 #include <string>
@@ -17,14 +16,6 @@
 namespace lapservo::internal {
 namespace {
 using testing::wait_for;
-
-// Time stands still but for what the test adds.
-class StandingClock : public Clock {
- public:
-  double now_s() const override { return now; }
-  void sleep_until(double) override {}
-  std::atomic<double> now = 10;
-};
 
 InterlockConfig config_of(bool motion_enabled) {
   InterlockConfig config;

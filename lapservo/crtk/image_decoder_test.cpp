@@ -54,14 +54,6 @@ TEST(ImageDecoder, AnImageIsTheMessageThatItIsDecodedFrom) {
   }
 }
 
-TEST(ImageDecoder, ADecodedImageIsItsOwn) {
-  ImageMessage message = message_of("bgr8", 3);
-  const DecodedImage image = decode(message);
-  const cv::Vec3b before = bgr_at(image, 0, 0);
-  message.data.assign(message.data.size(), 0);
-  EXPECT_EQ(bgr_at(image, 0, 0), before);
-}
-
 // A copy of each image of 1920x1080 would cost as much as a tracked frame.
 TEST(ImageDecoder, AnImageWithoutPaddingKeepsTheBytesOfItsMessage) {
   ImageMessage message = message_of("bgr8", 3, 0);

@@ -208,9 +208,6 @@ TEST(Interlock, ReportsTheWristOfTheTool) {
   Bench bench(config_of(true, {"outer_wrist"}));
   bench.pass(0.1);
   EXPECT_EQ(bench.interlock.state(bench.now_s).wrist_rad, std::vector<double>{bench.wrist});
-  Bench without(config_of(true, {"wrist", "jaw"}));
-  without.pass(0.1);
-  EXPECT_TRUE(without.interlock.state(without.now_s).wrist_rad.empty());
 }
 
 TEST(Interlock, NoStepExceedsTheRateLimitWhateverThePathDoes) {

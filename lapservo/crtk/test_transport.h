@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <functional>
 #include <map>
 #include <memory>
@@ -12,8 +13,17 @@
 #include <vector>
 
 #include "lapservo/crtk/transport.h"
+#include "lapservo/robot/clock.h"
 
 namespace lapservo::internal {
+
+/// Time stands still but for what a test adds.
+class StandingClock : public Clock {
+ public:
+  double now_s() const override { return now; }
+  void sleep_until(double) override {}
+  std::atomic<double> now = 10;
+};
 
 /// Topics in memory: messages that are published are kept; handlers get what say() says, in the caller's thread.
 class TestTransport : public Transport {

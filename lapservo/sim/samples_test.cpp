@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 struct Pair {
   std::array<Eigen::Vector2d, 4> edges_px;
   Eigen::Vector2d direction;
-  cv::Mat sample, rendered;
+  cv::Mat sample, rendered;  // linear light
   float gain;
 };
 
@@ -44,14 +44,14 @@ std::vector<Pair> pairs(const fs::path& folder) {
       pair.edges_px[k] = {truth.number(row, e + "_u_px"), truth.number(row, e + "_v_px")};
     }
     pair.direction = (pair.edges_px[3] - pair.edges_px[0]).normalized();
-    pair.sample = read_image(folder / truth.text(row, "file"));
+    pair.sample = light_of(read_image(folder / truth.text(row, "file")), {});
     RenderOptions options;
     options.sensor.gains = Light::Constant(gain);
     const cv::Mat background(camera.height_px, camera.width_px, CV_32FC3, cv::Scalar::all(0.2));
     Renderer renderer(camera, {shaft_of(rig.instruments[0])}, background, options);
     const JointVector q{truth.number(row, "theta_rad"), truth.number(row, "phi_rad"), truth.number(row, "rho_m"),
                         truth.number(row, "psi_rad")};
-    pair.rendered = renderer.render({placement_of(rig.instruments[0], q)}, row);
+    pair.rendered = light_of(renderer.render({placement_of(rig.instruments[0], q)}, row), {});
     pair.gain = gain;
     found.push_back(pair);
   }
@@ -72,10 +72,9 @@ class Samples : public ::testing::Test {
 TEST_F(Samples, BoundariesLieWhereRayTracedOnesDo) {
   double squares = 0, count = 0;
   for (const Pair& pair : pairs_) {
-    const cv::Mat sample = light_of(pair.sample, {}), rendered = light_of(pair.rendered, {});
     for (const Eigen::Vector2d& edge : pair.edges_px) {
-      const auto in_sample = crossing_px(sample, edge, pair.direction);
-      const auto in_rendered = crossing_px(rendered, edge, pair.direction);
+      const auto in_sample = crossing_px(pair.sample, edge, pair.direction);
+      const auto in_rendered = crossing_px(pair.rendered, edge, pair.direction);
       ASSERT_TRUE(in_sample && in_rendered);
       EXPECT_NEAR(*in_rendered, *in_sample, 0.12);
       squares += std::pow(*in_rendered - *in_sample, 2);
@@ -89,15 +88,14 @@ TEST_F(Samples, BoundariesLieWhereRayTracedOnesDo) {
 TEST_F(Samples, LightAndNoiseAreAlike) {
   double sample_noise = 0, rendered_noise = 0;
   for (const Pair& pair : pairs_) {
-    const cv::Mat sample = light_of(pair.sample, {}), rendered = light_of(pair.rendered, {});
     const Eigen::Vector2d across(-pair.direction.y(), pair.direction.x());
     for (std::size_t k = 0; k < 3; ++k)
       for (const double side_px : {-30, 0, 30}) {
         const Eigen::Vector2d at = 0.5 * (pair.edges_px[k] + pair.edges_px[k + 1]) + side_px * across;
         const cv::Rect patch(static_cast<int>(at.x()) - 2, static_cast<int>(at.y()) - 2, 5, 5);
         cv::Scalar a, b, spread_a, spread_b;
-        cv::meanStdDev(sample(patch), a, spread_a);
-        cv::meanStdDev(rendered(patch), b, spread_b);
+        cv::meanStdDev(pair.sample(patch), a, spread_a);
+        cv::meanStdDev(pair.rendered(patch), b, spread_b);
         for (int c = 0; c < 3; ++c) {
           EXPECT_NEAR(b[c], a[c], 0.05 * a[c] + 0.012 * pair.gain) << k << ' ' << side_px << ' ' << c;
           sample_noise += spread_a[c] * spread_a[c];
@@ -130,8 +128,8 @@ TEST_F(Samples, BlurIsAlike) {
   };
   double sample = 0, rendered = 0;
   for (const Pair& pair : pairs_) {
-    sample += rise_px(light_of(pair.sample, {}), pair);
-    rendered += rise_px(light_of(pair.rendered, {}), pair);
+    sample += rise_px(pair.sample, pair);
+    rendered += rise_px(pair.rendered, pair);
   }
   EXPECT_NEAR(rendered / sample, 1, 0.1);
 }

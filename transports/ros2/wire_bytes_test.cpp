@@ -148,10 +148,8 @@ TEST(WireBytes, OfWhatSteersAnArm) {
 TEST(WireBytes, OfPictures) {
   const Fields image =
       sent_as("sensor_msgs/Image", ImageMessage{stamp_s, 2, 1, 7, "rgb8", true, {1, 2, 3, 4, 5, 6, 255}, 0, "e"});
-  expect_fields(
-      image,
-      stamp +
-          "header.frame_id e, height 1, width 2, encoding rgb8, is_bigendian 1, step 7, data 7 of them, data[6] 255");
+  expect_fields(image, stamp + "header.frame_id e, height 1, width 2, encoding rgb8, is_bigendian 1, step 7, " +
+                           "data 7 of them, data[6] 255");
   expect_fields(sent_as("sensor_msgs/CompressedImage", CompressedImageMessage{stamp_s, "jpeg", {7, 8}, 0, "e"}),
                 "header.frame_id e, format jpeg, data 2 of them, data[1] 8");
   const CameraInfoMessage camera{stamp_s, 640, 360, {1, 2, 3, 4, 5}, {550, 0, 319.5, 0, 551, 179.5, 0, 0, 1}, "e"};
