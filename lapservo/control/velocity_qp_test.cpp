@@ -10,8 +10,7 @@
 
 #include "lapservo/core/random.h"
 
-namespace lapservo::internal {
-namespace velocity_qp_test {
+namespace lapservo::internal::velocity_qp_test {
 
 struct Problem {
   Eigen::Matrix4d weight = Eigen::Matrix4d::Identity();
@@ -95,17 +94,4 @@ TEST(VelocityQp, IsFeasibleAndOptimal) {
   EXPECT_GT(constrained, 3000);
 }
 
-TEST(VelocityQp, ReturnsTheWantedPointWhenItIsFeasible) {
-  HalfSpaces limits;
-  for (int i = 0; i < 4; ++i) {
-    limits.add(Eigen::Vector4d::Unit(i), 1);
-    limits.add(-Eigen::Vector4d::Unit(i), 1);
-  }
-  const Eigen::Vector4d wanted(0.1, -0.9, 0.3, 0.999);
-  const auto solution = solve_velocity_qp(Eigen::Matrix4d::Identity(), wanted, limits, Eigen::Vector4d::Zero());
-  EXPECT_EQ(solution.x, wanted);
-  EXPECT_FALSE(solution.constrained);
-}
-
-}  // namespace velocity_qp_test
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::velocity_qp_test
