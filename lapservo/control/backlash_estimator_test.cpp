@@ -10,8 +10,7 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/core/random.h"
 
-namespace lapservo::internal {
-namespace backlash_estimator_test {
+namespace lapservo::internal::backlash_estimator_test {
 
 constexpr double period_s = 1.0 / 60;
 
@@ -168,5 +167,4 @@ TEST(BacklashEstimator, KeepsWhatItKnowsThroughAnInterruption) {
   EXPECT_LT(after.sigma, 1.5 * before.sigma);
 }
 
-}  // namespace backlash_estimator_test
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::backlash_estimator_test

@@ -7,8 +7,7 @@
 
 #include "lapservo/core/random.h"
 
-namespace lapservo::internal {
-namespace following_error_limit_test {
+namespace lapservo::internal::following_error_limit_test {
 
 constexpr double period_s = 1.0 / 60, lag_s = 0.03;
 const JointLimits limits;
@@ -111,5 +110,4 @@ TEST(FollowingErrorLimit, StaysWithinTheLimitsWhateverIsWanted) {
   }
 }
 
-}  // namespace following_error_limit_test
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::following_error_limit_test

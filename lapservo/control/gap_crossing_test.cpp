@@ -7,8 +7,7 @@
 #include "lapservo/core/random.h"
 #include "lapservo/robot/backlash.h"
 
-namespace lapservo::internal {
-namespace gap_crossing_test {
+namespace lapservo::internal::gap_crossing_test {
 
 constexpr double period_s = 1.0 / 60;
 
@@ -111,5 +110,4 @@ TEST(CrossGaps, StaysWithinRateAndAcceleration) {
   }
 }
 
-}  // namespace gap_crossing_test
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::gap_crossing_test

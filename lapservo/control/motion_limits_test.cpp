@@ -7,9 +7,7 @@
 #include "lapservo/core/random.h"
 #include "lapservo/robot/joint_path.h"
 
-namespace lapservo::internal {
-namespace motion_limits_test {
-namespace {
+namespace lapservo::internal::motion_limits_test {
 
 constexpr double period_s = 1.0 / 60;
 
@@ -123,6 +121,4 @@ TEST(MotionLimits, BrakingKeepsTheDirectionAndStops) {
   }
 }
 
-}  // namespace
-}  // namespace motion_limits_test
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::motion_limits_test

@@ -6,8 +6,7 @@
 #include "lapservo/control/test_simulator.h"
 #include "lapservo/control/tracking_law.h"
 
-namespace lapservo::internal {
-namespace offset_observer_test {
+namespace lapservo::internal::offset_observer_test {
 
 using testing::TestRig;
 
@@ -207,5 +206,4 @@ TEST(OffsetObserver, RefusesWhatIsNotANumber) {
   EXPECT_EQ(world.observer.offset(), before);
 }
 
-}  // namespace offset_observer_test
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::offset_observer_test

@@ -10,8 +10,7 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/core/random.h"
 
-namespace lapservo::internal {
-namespace tracking_law_test {
+namespace lapservo::internal::tracking_law_test {
 
 Eigen::Matrix4d random_matrix(Random& random) {
   Eigen::Matrix4d matrix;
@@ -90,5 +89,4 @@ TEST(DampedInverse, StaysBoundedAndContinuousThroughSingularities) {
   }
 }
 
-}  // namespace tracking_law_test
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::tracking_law_test

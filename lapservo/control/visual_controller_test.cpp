@@ -34,13 +34,10 @@ Flaws usual_flaws() {
   return flaws;
 }
 
-struct Run {
-  std::vector<Moment> moments;
-  double delay_s = 0;
-};
+using Moments = std::vector<Moment>;
 
 /// When the features came close for good.
-double settled_s(const std::vector<Moment>& moments) {
+double settled_s(const Moments& moments) {
   double last_s = 0;
   for (const Moment& m : moments)
     if ((m.error.cwiseAbs() - close_enough).maxCoeff() > 0) last_s = m.time_s;
@@ -48,7 +45,7 @@ double settled_s(const std::vector<Moment>& moments) {
 }
 
 /// Mean of the errors to a power, 1 or 2, from then on.
-Eigen::Vector4d mean_after(const std::vector<Moment>& moments, double time_s, int power = 1) {
+Eigen::Vector4d mean_after(const Moments& moments, double time_s, int power = 1) {
   Eigen::Vector4d sum = Eigen::Vector4d::Zero();
   int samples = 0;
   for (const Moment& m : moments)
@@ -56,11 +53,11 @@ Eigen::Vector4d mean_after(const std::vector<Moment>& moments, double time_s, in
   return sum / samples;
 }
 
-Eigen::Vector4d rms_after(const std::vector<Moment>& moments, double time_s) {
+Eigen::Vector4d rms_after(const Moments& moments, double time_s) {
   return mean_after(moments, time_s, 2).cwiseSqrt();
 }
 
-void expect_limits_kept(const std::vector<Moment>& moments, const JointLimits& limits, double period_s) {
+void expect_limits_kept(const Moments& moments, const JointLimits& limits, double period_s) {
   MotionState before{moments.front().step.setpoint.position, Eigen::Vector4d::Zero()};
   for (const Moment& m : moments) {
     const MotionState& now = m.step.setpoint;
@@ -74,7 +71,7 @@ void expect_limits_kept(const std::vector<Moment>& moments, const JointLimits& l
   }
 }
 
-void expect_in_image(const std::vector<Moment>& moments) {
+void expect_in_image(const Moments& moments) {
   for (const Moment& m : moments) {
     const Eigen::Vector4d& e = m.truth.ends_px;
     ASSERT_GE(e.minCoeff(), 0) << m.time_s;
@@ -84,34 +81,33 @@ void expect_in_image(const std::vector<Moment>& moments) {
 }
 
 /// No limit is ever crossed.
-Run run_anywhere(const ControllerConfig& config, const FeatureModel& model, const Flaws& flaws,
-                 const Trajectory& trajectory, double duration_s, std::uint64_t seed) {
+Moments run_anywhere(const ControllerConfig& config, const FeatureModel& model, const Flaws& flaws,
+                     const Trajectory& trajectory, double duration_s, std::uint64_t seed) {
   Random random(seed);
   const TestRig rig;
   VisualController controller(config, model);
   TestSimulator simulator(rig, flaws, testing::random_start(rig, config, flaws, random), seed);
-  Run result{simulator.run(controller, trajectory, duration_s), 0};
-  result.delay_s = controller.delay_s();
-  expect_limits_kept(result.moments, config.limits, config.period_s + flaws.jitter_s);
-  return result;
+  const Moments done = simulator.run(controller, trajectory, duration_s);
+  expect_limits_kept(done, config.limits, config.period_s + flaws.jitter_s);
+  return done;
 }
 
 /// Nor does the marker leave the image.
-Run run(const ControllerConfig& config, const FeatureModel& model, const Flaws& flaws, const Trajectory& trajectory,
-        double duration_s, std::uint64_t seed) {
-  const Run result = run_anywhere(config, model, flaws, trajectory, duration_s, seed);
-  expect_in_image(result.moments);
-  return result;
+Moments run(const ControllerConfig& config, const FeatureModel& model, const Flaws& flaws, const Trajectory& trajectory,
+            double duration_s, std::uint64_t seed) {
+  const Moments done = run_anywhere(config, model, flaws, trajectory, duration_s, seed);
+  expect_in_image(done);
+  return done;
 }
 
 /// The usual controller, which knows the rig.
-Run run(const Flaws& flaws, const Trajectory& trajectory, double duration_s, std::uint64_t seed) {
+Moments run(const Flaws& flaws, const Trajectory& trajectory, double duration_s, std::uint64_t seed) {
   return run(testing::test_config(flaws), testing::model_of({}), flaws, trajectory, duration_s, seed);
 }
 
 /// Decay of a feature's error per second: the slope of its logarithm, from the last limited motion until it is below
 /// `least`. nullopt when it does not halve in between.
-std::optional<double> decay_per_s(const std::vector<Moment>& moments, int feature, double least) {
+std::optional<double> decay_per_s(const Moments& moments, int feature, double least) {
   std::size_t from = 0;
   for (std::size_t k = 0; k < moments.size(); ++k) {
     if (moments[k].step.limited || moments[k].time_s < 0.1) from = k + 1;
@@ -145,7 +141,7 @@ TEST(PaperLaw, EachFeaturesErrorDecaysWithItsOwnK) {
       SCOPED_TRACE(seed);
       const auto done = run(config, testing::model_of({}), flaws, trajectory, 30, seed);
       for (int i = 0; i < 4; ++i) {
-        const auto decay = decay_per_s(done.moments, i, least[i]);
+        const auto decay = decay_per_s(done, i, least[i]);
         if (!decay) continue;
         ++measured[i];
         EXPECT_NEAR(*decay, config.gains.per_s[i], 0.05 * config.gains.per_s[i]) << "feature " << i;
@@ -159,8 +155,8 @@ TEST(VisualController, TracksThePapersTrajectoryFromRandomStarts) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     SCOPED_TRACE(seed);
     const auto done = run(usual_flaws(), sinusoids(paper_sinusoids()), 12, seed);
-    EXPECT_LT(settled_s(done.moments), 5);
-    const Eigen::Vector4d rms = rms_after(done.moments, 6), mean = mean_after(done.moments, 6);
+    EXPECT_LT(settled_s(done), 5);
+    const Eigen::Vector4d rms = rms_after(done, 6), mean = mean_after(done, 6);
     EXPECT_LT(rms[0], 5e-4);
     EXPECT_LT(rms.tail<3>().maxCoeff(), 0.3);
     EXPECT_LT(std::abs(mean[0]), 1.7e-4);
@@ -177,9 +173,9 @@ TEST(VisualController, IsStableAtAnyLatencyKnownOrEstimated) {
       flaws.latency_s = latency_s;
       flaws.delay_known = known;
       const auto done = run(flaws, sinusoids(paper_sinusoids()), 30, 7);
-      EXPECT_LT(settled_s(done.moments), 5);
-      EXPECT_NEAR(done.delay_s, latency_s, 0.5 / 60);
-      const Eigen::Vector4d rms = rms_after(done.moments, 10);
+      EXPECT_LT(settled_s(done), 5);
+      EXPECT_NEAR(done.back().step.delay_s, latency_s, 0.5 / 60);
+      const Eigen::Vector4d rms = rms_after(done, 10);
       if (latency_s == 0) rms_at_zero = rms;
       if (latency_s <= 0.15) {
         EXPECT_LT(rms.cwiseQuotient(rms_at_zero).maxCoeff(), 1.2);
@@ -198,8 +194,8 @@ TEST(VisualController, CopesWithDroppedFramesFastStepsAndTheirJitter) {
     ControllerConfig config = testing::test_config(flaws);
     config.period_s = 1.0 / 240;
     const auto done = run(config, testing::model_of({}), flaws, sinusoids(paper_sinusoids()), 15, 5);
-    EXPECT_LT(settled_s(done.moments), 5);
-    EXPECT_LT(rms_after(done.moments, 6).tail<3>().maxCoeff(), 0.3);
+    EXPECT_LT(settled_s(done), 5);
+    EXPECT_LT(rms_after(done, 6).tail<3>().maxCoeff(), 0.3);
   }
 }
 
@@ -221,8 +217,8 @@ Holds holds_at(long frame_every, double pause_s, std::uint64_t seed) {
   };
   const auto done = run(flaws, set_point(paper_sinusoids().offset), 22, seed);
   Holds holds;
-  for (std::size_t k = 120; k < done.moments.size(); ++k) {
-    const HoldReason before = done.moments[k - 1].step.reason, now = done.moments[k].step.reason;
+  for (std::size_t k = 120; k < done.size(); ++k) {
+    const HoldReason before = done[k - 1].step.reason, now = done[k].step.reason;
     holds.changes += now != before;
     holds.slow_s += now == HoldReason::slow_images ? 1.0 / 60 : 0;
     holds.stale_s += now == HoldReason::stale_image ? 1.0 / 60 : 0;
@@ -267,13 +263,13 @@ TEST(VisualController, BacklashLeavesNoBias) {
   for (const bool known : {true, false}) {
     flaws.delay_known = known;
     const auto still = run(flaws, set_point(paper_sinusoids().offset), 20, 3);
-    EXPECT_LT(rms_after(still.moments, 8)[0], 5e-4);
-    EXPECT_LT(rms_after(still.moments, 8).tail<3>().maxCoeff(), 0.3);
-    EXPECT_LT(mean_after(still.moments, 8).tail<3>().cwiseAbs().maxCoeff(), 0.1);
+    EXPECT_LT(rms_after(still, 8)[0], 5e-4);
+    EXPECT_LT(rms_after(still, 8).tail<3>().maxCoeff(), 0.3);
+    EXPECT_LT(mean_after(still, 8).tail<3>().cwiseAbs().maxCoeff(), 0.1);
     const auto moving = run(flaws, sinusoids(paper_sinusoids()), 65, 3);
-    EXPECT_LT(std::abs(mean_after(moving.moments, 5)[0]), 1.7e-4);
-    EXPECT_LT(mean_after(moving.moments, 5).tail<3>().cwiseAbs().maxCoeff(), 0.1);
-    EXPECT_NEAR(moving.delay_s, flaws.latency_s, 0.5 / 60);
+    EXPECT_LT(std::abs(mean_after(moving, 5)[0]), 1.7e-4);
+    EXPECT_LT(mean_after(moving, 5).tail<3>().cwiseAbs().maxCoeff(), 0.1);
+    EXPECT_NEAR(moving.back().step.delay_s, flaws.latency_s, 0.5 / 60);
   }
 }
 
@@ -297,7 +293,7 @@ void expect_converged(std::uint64_t seed, const Flaws& flaws, double within_s) {
   Random random(1000 + seed);
   const auto done =
       run(config, testing::model_of(wrong_rig(random)), flaws, set_point(paper_sinusoids().offset), within_s + 3, seed);
-  EXPECT_LT(settled_s(done.moments), within_s);
+  EXPECT_LT(settled_s(done), within_s);
 }
 
 TEST(VisualController, ConvergesInTheImageWithAWrongModelAndBacklash) {
@@ -327,10 +323,10 @@ TEST(VisualController, LearnsBacklashSoThatReversalsLeaveLittleError) {
       unlearnt.observer.backlash.largest.setZero();
       const auto done = run(flaws, trajectory, 40, 3),
                  before = run(unlearnt, testing::model_of({}), flaws, trajectory, 40, 3);
-      const Eigen::Vector4d width = done.moments.back().step.estimate->gap.width;
+      const Eigen::Vector4d width = done.back().step.estimate->gap.width;
       for (const int i : {2, 3}) EXPECT_NEAR(width[i], flaws.backlash[i], 0.15 * flaws.backlash[i]) << i;
       EXPECT_TRUE(width.head<2>().isZero());
-      const Eigen::Vector4d rms = rms_after(done.moments, 15), rms_unlearnt = rms_after(before.moments, 15);
+      const Eigen::Vector4d rms = rms_after(done, 15), rms_unlearnt = rms_after(before, 15);
       EXPECT_LT(rms[1], rms_unlearnt[1] / 4);
       EXPECT_LT(rms[3], rms_unlearnt[3] / 3);
       if (latency_s == 0) rms_at_zero = rms;
@@ -360,7 +356,7 @@ TEST(VisualController, RestsAtASetPointWithBacklashLearnt) {
 }
 
 /// The widest estimate of a gap, in fractions of the true one: rho's and psi's.
-Eigen::Vector2d widest_gap(const std::vector<Moment>& moments, const Eigen::Vector2d& unit) {
+Eigen::Vector2d widest_gap(const Moments& moments, const Eigen::Vector2d& unit) {
   Eigen::Vector2d widest = Eigen::Vector2d::Zero();
   for (const Moment& m : moments) {
     if (m.step.estimate) widest = widest.cwiseMax(m.step.estimate->gap.width.tail<2>().cwiseQuotient(unit));
@@ -380,7 +376,7 @@ TEST(VisualController, IsNotFooledIntoBacklashByAWrongModel) {
       Random random(2000 + seed);
       const TestRig rig = seed <= 5 ? TestRig{} : wrong_rig(random);
       const auto done = run(config, testing::model_of(rig), flaws, sinusoids(paper_sinusoids()), 30, seed);
-      EXPECT_LT(widest_gap(done.moments, usual).maxCoeff(), times + 0.6);
+      EXPECT_LT(widest_gap(done, usual).maxCoeff(), times + 0.6);
     }
   }
 }
@@ -395,8 +391,8 @@ TEST(VisualController, ConvergesUncalibratedFromRandomStarts) {
     ControllerConfig config = testing::test_config(flaws);
     config.mode = ControlMode::uncalibrated;
     const auto done = run(config, {}, flaws, set_point(paper_sinusoids().offset), 12, seed);
-    EXPECT_LT(settled_s(done.moments), 9);
-    EXPECT_NEAR(done.delay_s, flaws.latency_s, 0.5 / 60);
+    EXPECT_LT(settled_s(done), 9);
+    EXPECT_NEAR(done.back().step.delay_s, flaws.latency_s, 0.5 / 60);
   }
 }
 
@@ -423,8 +419,8 @@ TEST(VisualController, TracksUncalibrated) {
   ControllerConfig config = testing::test_config(flaws);
   config.mode = ControlMode::uncalibrated;
   const auto done = run(config, {}, flaws, sinusoids(paper_sinusoids()), 40, 2);
-  EXPECT_LT(rms_after(done.moments, 10)[0], 2e-3);
-  EXPECT_LT(rms_after(done.moments, 10).tail<3>().maxCoeff(), 1);
+  EXPECT_LT(rms_after(done, 10)[0], 2e-3);
+  EXPECT_LT(rms_after(done, 10).tail<3>().maxCoeff(), 1);
 }
 
 // Measured joints that are wild for one tick cost that tick and nothing else.
@@ -437,9 +433,9 @@ TEST(VisualController, OneWildReadingSpoilsNothing) {
       return std::abs(time_s - 6) < 0.5 / 60 ? wild : Eigen::Vector4d(Eigen::Vector4d::Zero());
     };
     const auto done = run(flaws, sinusoids(paper_sinusoids()), 8, 1);
-    EXPECT_NEAR(done.delay_s, 0.08, 0.005);
+    EXPECT_NEAR(done.back().step.delay_s, 0.08, 0.005);
     int held = 0;
-    for (const Moment& m : done.moments) {
+    for (const Moment& m : done) {
       if (m.time_s < 5) continue;
       held += m.step.reason == HoldReason::wild_joints;
       EXPECT_LT(std::abs(m.error[0]), 2e-3) << m.time_s;
@@ -538,7 +534,7 @@ TEST_P(Holding, WithinAPeriodWhenTheMarkerIsHiddenAndResumesWithoutAJump) {
   const ControllerConfig config = config_for(flaws);
   const auto done = run(config, testing::model_of({}), flaws, sinusoids(paper_sinusoids()), 25, 4);
   const double period_s = config.period_s;
-  for (const Moment& m : done.moments) {
+  for (const Moment& m : done) {
     const double shown_s = m.time_s - flaws.latency_s;
     if (shown_s > 8 + 1.1 * period_s && shown_s < 10 - 0.1 * period_s) {
       ASSERT_EQ(m.step.action, ControlAction::hold) << m.time_s;
@@ -552,7 +548,7 @@ TEST_P(Holding, WithinAPeriodWhenTheMarkerIsHiddenAndResumesWithoutAJump) {
     }
   }
   if (GetParam() == ControlMode::fused) {
-    EXPECT_LT(settled_s(done.moments), 15);
+    EXPECT_LT(settled_s(done), 15);
   }
 }
 

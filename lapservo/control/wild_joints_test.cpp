@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace lapservo::internal {
-namespace wild_joints_test {
+namespace lapservo::internal::wild_joints_test {
 
 using Verdict = WildJoints::Verdict;
 constexpr double period_s = 1.0 / 60;
@@ -40,5 +39,4 @@ TEST(WildJoints, WhereTheyStayTheyAre) {
   EXPECT_EQ(joints.validate(5 * period_s, start), Verdict::wild);
 }
 
-}  // namespace wild_joints_test
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::wild_joints_test

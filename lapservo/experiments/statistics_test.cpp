@@ -6,8 +6,7 @@
 
 #include "lapservo/core/random.h"
 
-namespace lapservo::internal {
-namespace statistics_test {
+namespace lapservo::internal::statistics_test {
 
 constexpr std::uint64_t seed = 72;
 
@@ -64,5 +63,4 @@ TEST(WithDigits, NeverHasAnExponent) {
   EXPECT_EQ(with_digits(0, 3), "0.00");
 }
 
-}  // namespace statistics_test
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::statistics_test

@@ -37,19 +37,33 @@ ControlTick tick_of(const Rig& rig) {
   return tick;
 }
 
-TEST(LoopTopics, TellsWhatWasSeenAndDecided) {
+struct Loop {
+  explicit Loop(bool hears = true) : topics(transport, rig, {}, false, hears) {}
+  template <class Message>
+  std::vector<Message> sent(const std::string& topic) {
+    return transport.sent<Message>("/lapservo/PSM1/" + topic);
+  }
+  template <class Message>
+  LoopWishes hear(const std::string& topic, const Message& message) {
+    transport.say("/lapservo/PSM1/" + topic, message);
+    return topics.wishes();
+  }
+
   const Rig rig = testing::small_test_rig();
   TestTransport transport;
-  {
-    LoopTopics topics(transport, rig, {});
-    topics.publish(tick_of(rig), "");
-    EXPECT_TRUE(testing::wait_for(
-        [&] { return !transport.sent<CompressedImageMessage>("/lapservo/PSM1/overlay/compressed").empty(); }));
-  }
-  const auto observations = transport.sent<ObservationMessage>("/lapservo/PSM1/observation");
+  LoopTopics topics;
+};
+
+const std::vector<std::string> names{"s_rad", "r_px", "l_px", "d_px"};
+
+TEST(LoopTopics, TellsWhatWasSeenAndDecided) {
+  Loop loop;
+  loop.topics.publish(tick_of(loop.rig), "");
+  EXPECT_TRUE(testing::wait_for([&] { return !loop.sent<CompressedImageMessage>("overlay/compressed").empty(); }));
+  const auto observations = loop.sent<ObservationMessage>("observation");
   ASSERT_EQ(observations.size(), 1u);
   const ObservationMessage& seen = observations.front();
-  EXPECT_NEAR(seen.stamp_s, transport.stamp_s - 0.02, 1e-9);  // the stamp of the image, not of the message
+  EXPECT_NEAR(seen.stamp_s, loop.transport.stamp_s - 0.02, 1e-9);  // the stamp of the image, not of the message
   EXPECT_EQ(seen.status, "ok");
   EXPECT_EQ(seen.action, "track");
   EXPECT_EQ(seen.frame, "endoscope");
@@ -57,58 +71,51 @@ TEST(LoopTopics, TellsWhatWasSeenAndDecided) {
   EXPECT_EQ(seen.features[2], 182);
   EXPECT_EQ(seen.q_covariance[15], 4e-6);
   EXPECT_EQ(seen.error[1], 1);
-  EXPECT_EQ(transport.sent<PoseMessage>("/lapservo/PSM1/pose").size(), 1u);
-  EXPECT_EQ(transport.sent<JointMessage>("/lapservo/PSM1/error").at(0).positions[3], 3);
-  EXPECT_EQ(transport.sent<JointMessage>("/lapservo/PSM1/desired").at(0).names[1], "r_px");
-  EXPECT_EQ(transport.sent<DiagnosticMessage>("/diagnostics").at(0).message, "track");
-  EXPECT_EQ(transport.sent<CompressedImageMessage>("/lapservo/PSM1/overlay/compressed").size(), 1u);
+  EXPECT_EQ(loop.sent<PoseMessage>("pose").size(), 1u);
+  EXPECT_EQ(loop.sent<JointMessage>("error").at(0).positions[3], 3);
+  EXPECT_EQ(loop.sent<JointMessage>("desired").at(0).names[1], "r_px");
+  EXPECT_EQ(loop.transport.sent<DiagnosticMessage>("/diagnostics").at(0).message, "track");
+  EXPECT_EQ(loop.sent<CompressedImageMessage>("overlay/compressed").size(), 1u);
 }
 
 TEST(LoopTopics, WhatIsNotKnownIsNotANumber) {
-  const Rig rig = testing::small_test_rig();
-  TestTransport transport;
-  LoopTopics topics(transport, rig, {});
-  ControlTick tick = tick_of(rig);
+  Loop loop;
+  ControlTick tick = tick_of(loop.rig);
   tick.seen->observations[0] = {};
   tick.seen->measurement = {};
   tick.decision.control.estimate.reset();
   tick.decision.control.action = ControlAction::hold;
-  topics.publish(tick, "hold: marker_lost");
-  const ObservationMessage seen = transport.sent<ObservationMessage>("/lapservo/PSM1/observation").at(0);
+  loop.topics.publish(tick, "hold: marker_lost");
+  const ObservationMessage seen = loop.sent<ObservationMessage>("observation").at(0);
   EXPECT_EQ(seen.status, "no_marker");
   for (const double number : {seen.q[0], seen.features[0], seen.error[0], seen.edges_px[7], seen.q_covariance[5]})
     EXPECT_TRUE(std::isnan(number));
-  EXPECT_TRUE(transport.sent<PoseMessage>("/lapservo/PSM1/pose").empty());
-  EXPECT_EQ(transport.sent<DiagnosticMessage>("/diagnostics").at(0).message, "hold: marker_lost");
-  EXPECT_EQ(transport.sent<DiagnosticMessage>("/diagnostics").at(0).level, DiagnosticMessage::Level::warning);
+  EXPECT_TRUE(loop.sent<PoseMessage>("pose").empty());
+  const DiagnosticMessage diagnostic = loop.transport.sent<DiagnosticMessage>("/diagnostics").at(0);
+  EXPECT_EQ(diagnostic.message, "hold: marker_lost");
+  EXPECT_EQ(diagnostic.level, DiagnosticMessage::Level::warning);
 }
 
 TEST(LoopTopics, HearsCommandsAndDropsWhatMakesNoSense) {
-  const Rig rig = testing::small_test_rig();
-  TestTransport transport;
-  LoopTopics topics(transport, rig, {});
+  Loop loop;
   const double begin_s = SteadyClock().now_s();
-  for (const char* text : {"start", "stop"}) transport.say("/lapservo/PSM1/command", StringMessage{0, text});
-  const LoopWishes both = topics.wishes();
+  loop.transport.say("/lapservo/PSM1/command", StringMessage{0, "start"});
+  const LoopWishes both = loop.hear("command", StringMessage{0, "stop"});
   ASSERT_TRUE(both.stops.size() == 1 && both.starts.size() == 1);
   EXPECT_GE(both.starts[0].said_s, begin_s);
   EXPECT_FALSE(both.starts[0].force);
-  transport.say("/lapservo/PSM1/command", StringMessage{0, " Start  FORCE\n", 7});
-  const LoopWishes forced = topics.wishes();
+  const LoopWishes forced = loop.hear("command", StringMessage{0, " Start  FORCE\n", 7});
   ASSERT_EQ(forced.starts.size(), 1u);
   EXPECT_TRUE(forced.starts[0].force);
   EXPECT_EQ(forced.starts[0].source, 7u);
-  const LoopWishes none = topics.wishes();
+  const LoopWishes none = loop.topics.wishes();
   EXPECT_TRUE(none.stops.empty() && none.starts.empty());
-  const std::vector<std::string> names{"s_rad", "r_px", "l_px", "d_px"};
-  transport.say("/lapservo/PSM1/set_point", JointMessage{0, names, {0.9, 400, 180, 100}});
-  const LoopWishes wishes = topics.wishes();
+  const LoopWishes wishes = loop.hear("set_point", JointMessage{0, names, {0.9, 400, 180, 100}});
   ASSERT_TRUE(wishes.set_point);
   EXPECT_EQ(*wishes.set_point, Eigen::Vector4d(0.9, 400, 180, 100));
   for (const JointMessage& bad : {JointMessage{0, names, {0.9, NAN, 180, 100}}, JointMessage{0, names, {0.9, 400, 180}},
                                   JointMessage{0, {}, {0.9, 400, 180, 100}}}) {
-    transport.say("/lapservo/PSM1/set_point", bad);
-    const LoopWishes dropped = topics.wishes();
+    const LoopWishes dropped = loop.hear("set_point", bad);
     EXPECT_FALSE(dropped.set_point);
     EXPECT_EQ(dropped.remarks.size(), 1u);
   }
@@ -116,17 +123,14 @@ TEST(LoopTopics, HearsCommandsAndDropsWhatMakesNoSense) {
 
 // A person in a hurry writes what comes to mind.
 TEST(LoopTopics, AnyWordButStartStops) {
-  TestTransport transport;
-  LoopTopics topics(transport, testing::small_test_rig(), {});
+  Loop loop;
   for (const char* text : {"stop", "STOP", " stop ", "Stop\n"}) {
-    transport.say("/lapservo/PSM1/command", StringMessage{0, text, 3});
-    const LoopWishes wishes = topics.wishes();
+    const LoopWishes wishes = loop.hear("command", StringMessage{0, text, 3});
     EXPECT_EQ(wishes.stops, std::set<std::uint64_t>{3}) << text;
     EXPECT_TRUE(wishes.remarks.empty()) << text;
   }
   for (const char* text : {"hold", "halt!", "", "starts", "start now", "\x01\xff"}) {
-    transport.say("/lapservo/PSM1/command", StringMessage{0, text, 3});
-    const LoopWishes wishes = topics.wishes();
+    const LoopWishes wishes = loop.hear("command", StringMessage{0, text, 3});
     EXPECT_EQ(wishes.stops, std::set<std::uint64_t>{3}) << text;
     ASSERT_EQ(wishes.remarks.size(), 1u) << text;
     EXPECT_NE(wishes.remarks.begin()->find("expected start, start force or stop"), std::string::npos);
@@ -135,57 +139,43 @@ TEST(LoopTopics, AnyWordButStartStops) {
 
 // `ros2 topic pub` repeats once a second; a start that stands would start the arm after each hold.
 TEST(LoopTopics, AStartThatIsRepeatedCountsOnce) {
-  TestTransport transport;
-  LoopTopics topics(transport, testing::small_test_rig(), {});
+  Loop loop;
   std::size_t starts = 0, remarks = 0;
   for (int k = 0; k < 30; ++k) {
-    transport.say("/lapservo/PSM1/command", StringMessage{0, "start", static_cast<std::uint64_t>(k % 2)});
-    const LoopWishes wishes = topics.wishes();
+    const LoopWishes wishes = loop.hear("command", StringMessage{0, "start", static_cast<std::uint64_t>(k % 2)});
     starts += wishes.starts.size(), remarks += wishes.remarks.size();
     std::this_thread::sleep_for(std::chrono::milliseconds(60));
   }
   EXPECT_EQ(starts, 1u);
   EXPECT_EQ(remarks, 29u);
   std::this_thread::sleep_for(std::chrono::milliseconds(1600));
-  transport.say("/lapservo/PSM1/command", StringMessage{0, "start"});
-  EXPECT_EQ(topics.wishes().starts.size(), 1u);
+  EXPECT_EQ(loop.hear("command", StringMessage{0, "start"}).starts.size(), 1u);
 }
 
 TEST(LoopTopics, KnowsAnotherLoopOfItsName) {
-  TestTransport transport;
-  LoopTopics topics(transport, testing::small_test_rig(), {}, false, false);
-  topics.publish(tick_of(testing::small_test_rig()), "");
-  EXPECT_FALSE(topics.name_is_in_use());
-  transport.say("/lapservo/PSM1/desired", JointMessage{});
-  EXPECT_TRUE(topics.name_is_in_use());
+  Loop loop(false);
+  loop.topics.publish(tick_of(loop.rig), "");
+  EXPECT_FALSE(loop.topics.name_is_in_use());
+  loop.hear("desired", JointMessage{});
+  EXPECT_TRUE(loop.topics.name_is_in_use());
 }
 
 TEST(LoopTopics, HearsNothingWhereNobodyMayCommand) {
-  TestTransport transport;
-  LoopTopics topics(transport, testing::small_test_rig(), {}, false, false);
-  transport.say("/lapservo/PSM1/command", StringMessage{0, "start"});
-  EXPECT_TRUE(topics.wishes().starts.empty());
+  Loop loop(false);
+  EXPECT_TRUE(loop.hear("command", StringMessage{0, "start"}).starts.empty());
 }
 
 TEST(LoopTopics, HearsTrajectories) {
-  const Rig rig = testing::small_test_rig();
-  TestTransport transport;
-  LoopTopics topics(transport, rig, {});
-  const std::vector<std::string> names{"s_rad", "r_px", "l_px", "d_px"};
+  Loop loop;
   using Points = std::vector<TrajectoryMessage::Point>;
-  const auto say = [&](const std::vector<std::string>& of, const Points& points) {
-    transport.say("/lapservo/PSM1/trajectory", TrajectoryMessage{0, of, points});
-  };
   const auto refused = [&](const std::vector<std::string>& of, const Points& points) {
-    say(of, points);
-    const LoopWishes dropped = topics.wishes();
+    const LoopWishes dropped = loop.hear("trajectory", TrajectoryMessage{0, of, points});
     EXPECT_FALSE(dropped.trajectory);
     EXPECT_EQ(dropped.remarks.size(), 1u);
   };
-  transport.say("/lapservo/PSM1/set_point", JointMessage{0, names, {0.8, 390, 170, 90}});
+  loop.transport.say("/lapservo/PSM1/set_point", JointMessage{0, names, {0.8, 390, 170, 90}});
   const Points points{{0, {0.9, 400, 180, 100}}, {2, {0.9, 420, 180, 100}}, {4, {0.9, 400, 180, 100}}};
-  say(names, points);
-  const LoopWishes wishes = topics.wishes();
+  const LoopWishes wishes = loop.hear("trajectory", TrajectoryMessage{0, names, points});
   EXPECT_FALSE(wishes.set_point);  // what came last counts
   ASSERT_TRUE(wishes.trajectory);
   EXPECT_EQ(wishes.trajectory->duration_s, 4);
@@ -202,11 +192,9 @@ TEST(LoopTopics, HearsTrajectories) {
 }
 
 TEST(LoopTopics, HearsGoalsOfTheTip) {
-  TestTransport transport;
-  LoopTopics topics(transport, testing::small_test_rig(), {});
+  Loop loop;
   const auto say = [&](const Eigen::Vector3d& place_m, const Eigen::Quaterniond& turn) {
-    transport.say("/lapservo/PSM1/tip_goal", PlaceMessage{0, {}, {turn, place_m}});
-    return topics.wishes();
+    return loop.hear("tip_goal", PlaceMessage{0, {}, {turn, place_m}});
   };
   const Eigen::Vector3d place_m(0.01, -0.02, 0.12);
   const Eigen::Quaterniond unset(1, 0, 0, 0), turned(0.6, 0, 0.8, 0);
@@ -225,10 +213,9 @@ TEST(LoopTopics, HearsGoalsOfTheTip) {
     EXPECT_NE(none.remarks.begin()->find(why), std::string::npos) << *none.remarks.begin();
   }
   using Points = std::vector<TrajectoryMessage::Point>;
-  transport.say("/lapservo/PSM1/tip_goal", PlaceMessage{0, {}, {unset, place_m}});
-  transport.say("/lapservo/PSM1/trajectory",
-                TrajectoryMessage{0, {"x_m", "y_m", "z_m"}, Points{{0, {0, 0, 0.1}}, {2, {0.01, 0, 0.1}}}});
-  const LoopWishes last = topics.wishes();
+  loop.transport.say("/lapservo/PSM1/tip_goal", PlaceMessage{0, {}, {unset, place_m}});
+  const LoopWishes last = loop.hear(
+      "trajectory", TrajectoryMessage{0, {"x_m", "y_m", "z_m"}, Points{{0, {0, 0, 0.1}}, {2, {0.01, 0, 0.1}}}});
   EXPECT_FALSE(last.tip_goal);  // what came last counts
   ASSERT_TRUE(last.trajectory && last.trajectory->tip_at(2));
   EXPECT_EQ(last.trajectory->tip_at(2)->position_m, Eigen::Vector3d(0.01, 0, 0.1));

@@ -22,6 +22,8 @@ const Eigen::Vector4d slow(0.1, -0.1, 0.01, 0.3), at_rest(1e-4, 1e-4, 5e-5, 1e-4
 // An arm that samples its path at once, and the loop's ticks, on a clock that only this test moves.
 class Bench : public Robot, public Clock {
  public:
+  explicit Bench(double passed_s = 0) { pass(passed_s); }
+
   JointState state() override {
     JointState state{now - reading_age_s, JointVector::from_vector(q), operating_state};
     state.blocked = pulse == Blocked::none ? blocked : pulse;
@@ -56,7 +58,11 @@ class Bench : public Robot, public Clock {
     pass(duration_s);
     return ((q - before).cwiseAbs().array() > at_rest.array()).any();
   }
-  void start(Commander who = Commander::program) { supervisor.start(who, now); }
+  void start(Commander who = Commander::program, bool force = false) { supervisor.start(who, now, force); }
+  bool moves_after_start(Commander who = Commander::program, bool force = false) {
+    start(who, force);
+    return moves();
+  }
 
   double now = 100, suspended = 0, reading_age_s = 0;
   OperatingState operating_state = OperatingState::enabled;
@@ -113,15 +119,20 @@ TEST(Supervisor, TheFirstStartWaitsForTheArmsFirstWordsOnly) {
 // Whatever an operator or the arm does: held within a tick, at rest within the limits, silent, and then no joint moves
 // until a start, however long the arm has been ready again.
 TEST(Supervisor, AfterAnythingButTrackingItIsHeldUntilAStart) {
-  const std::vector<std::pair<std::string, std::function<void(Bench&, bool)>>> events{
-      {"not_enabled",
-       [](Bench& b, bool on) { b.operating_state = on ? OperatingState::disabled : OperatingState::enabled; }},
-      {"not_enabled",
-       [](Bench& b, bool on) { b.operating_state = on ? OperatingState::fault : OperatingState::enabled; }},
-      {"not_homed", [](Bench& b, bool on) { b.blocked = on ? Blocked::not_homed : Blocked::none; }},
+  using Event = std::function<void(Bench&, bool)>;
+  const auto state = [](OperatingState is) -> Event {
+    return [is](Bench& b, bool on) { b.operating_state = on ? is : OperatingState::enabled; };
+  };
+  const auto block = [](Blocked is) -> Event {
+    return [is](Bench& b, bool on) { b.blocked = on ? is : Blocked::none; };
+  };
+  const std::vector<std::pair<std::string, Event>> events{
+      {"not_enabled", state(OperatingState::disabled)},
+      {"not_enabled", state(OperatingState::fault)},
+      {"not_homed", block(Blocked::not_homed)},
       {"busy", [](Bench& b, bool on) { b.pulse = on ? Blocked::busy : Blocked::none; }},
-      {"foreign_command", [](Bench& b, bool on) { b.blocked = on ? Blocked::foreign_command : Blocked::none; }},
-      {"non_finite_joints", [](Bench& b, bool on) { b.blocked = on ? Blocked::non_finite_joints : Blocked::none; }},
+      {"foreign_command", block(Blocked::foreign_command)},
+      {"non_finite_joints", block(Blocked::non_finite_joints)},
       {"displaced",
        [](Bench& b, bool on) {
          b.supervisor.tell_loop(on ? "not_following" : "", on ? Blocked::displaced : Blocked::none);
@@ -129,8 +140,7 @@ TEST(Supervisor, AfterAnythingButTrackingItIsHeldUntilAStart) {
   };
   for (const auto& [reason, event] : events) {
     SCOPED_TRACE(reason);
-    Bench bench;
-    bench.pass(1);
+    Bench bench(1);
     event(bench, true);
     bench.pass(tick_s);
     EXPECT_FALSE(bench.supervisor.armed());
@@ -142,16 +152,14 @@ TEST(Supervisor, AfterAnythingButTrackingItIsHeldUntilAStart) {
     EXPECT_FALSE(bench.moves(3));
     EXPECT_EQ(bench.sends, sends);
     EXPECT_EQ(bench.supervisor.text(), "hold: " + reason + " (say start to continue)");
-    bench.start();
-    EXPECT_TRUE(bench.moves());
+    EXPECT_TRUE(bench.moves_after_start());
     EXPECT_EQ(bench.starts, 2);
   }
 }
 
 TEST(Supervisor, ASilenceThatIsShortPassesAndALongOneNeedsAStart) {
   for (const double age_s : {0.11, static_cast<double>(NAN)}) {
-    Bench bench;
-    bench.pass(1);
+    Bench bench(1);
     for (const double silence_s : {0.4, 0.6}) {
       bench.reading_age_s = age_s;
       bench.pass(tick_s);
@@ -164,8 +172,7 @@ TEST(Supervisor, ASilenceThatIsShortPassesAndALongOneNeedsAStart) {
       EXPECT_EQ(bench.moves(), silence_s < 0.5);
     }
     EXPECT_EQ(bench.supervisor.text(), "hold: old_joint_states (say start to continue)");
-    Bench stopped;
-    stopped.pass(1);
+    Bench stopped(1);
     stopped.blocked = Blocked::no_setpoint;
     stopped.pass(0.1);
     stopped.pulse = Blocked::busy;
@@ -178,8 +185,7 @@ TEST(Supervisor, ASilenceThatIsShortPassesAndALongOneNeedsAStart) {
 // However long it hung; the arm has spoken all the while, and somebody may have moved it.
 TEST(Supervisor, ALoopThatStoodStillNeedsAStart) {
   for (const double hung_s : {0.3, 0.6, 5.0, 30.0}) {
-    Bench bench;
-    bench.pass(1);
+    Bench bench(1);
     bench.now += hung_s;
     const int sends = bench.sends;
     bench.pass(tick_s);
@@ -189,8 +195,7 @@ TEST(Supervisor, ALoopThatStoodStillNeedsAStart) {
     EXPECT_EQ(bench.supervisor.text(), "hold: loop_late (say start to continue)");
     bench.supervisor.start(Commander::page, bench.now - hung_s / 2);  // said meanwhile
     EXPECT_FALSE(bench.moves(2));
-    bench.start();
-    EXPECT_TRUE(bench.moves());
+    EXPECT_TRUE(bench.moves_after_start());
   }
 }
 
@@ -205,14 +210,12 @@ TEST(Supervisor, AComputerThatWasSuspendedNeedsAStart) {
   EXPECT_EQ(bench.supervisor.blocked(), Blocked::loop_late);
   bench.pass(0.5);  // it brakes
   EXPECT_FALSE(bench.moves(2));
-  bench.start();
-  EXPECT_TRUE(bench.moves());
+  EXPECT_TRUE(bench.moves_after_start());
 }
 
 // An arm that fell silent while the loop stood still, too, is no short silence.
 TEST(Supervisor, ASilenceCountsFromWhenTheArmWasReadyLast) {
-  Bench bench;
-  bench.pass(1);
+  Bench bench(1);
   bench.reading_age_s = 0.2;
   bench.now += 0.45;
   bench.pass(0.1);
@@ -222,8 +225,7 @@ TEST(Supervisor, ASilenceCountsFromWhenTheArmWasReadyLast) {
 
 // An arm that is enabled and homed is all right for a moment before it homes.
 TEST(Supervisor, AStartCountsWhenTheArmHasBeenReadyForHalfASecond) {
-  Bench bench;
-  bench.pass(1);
+  Bench bench(1);
   bench.operating_state = OperatingState::disabled;
   bench.pass(1);
   bench.start();
@@ -244,8 +246,7 @@ TEST(Supervisor, AStartCountsWhenTheArmHasBeenReadyForHalfASecond) {
 }
 
 TEST(Supervisor, AStopBeatsAStartAndOldStartsAreVoid) {
-  Bench bench;
-  bench.pass(1);
+  Bench bench(1);
   bench.supervisor.stop(Commander::page);
   bench.pass(1);
   for (const bool stop_first : {true, false}) {
@@ -263,8 +264,7 @@ TEST(Supervisor, AStopBeatsAStartAndOldStartsAreVoid) {
 }
 
 TEST(Supervisor, AHoldDoesNotHideWhatBecomesOfTheArm) {
-  Bench bench;
-  bench.pass(1);
+  Bench bench(1);
   bench.supervisor.stop(Commander::page);
   bench.pass(0.1);
   EXPECT_TRUE(bench.supervisor.can_start());
@@ -282,40 +282,31 @@ TEST(Supervisor, AHoldDoesNotHideWhatBecomesOfTheArm) {
 }
 
 TEST(Supervisor, WhoHoldsHasToLetGoUnlessTheStartHasForce) {
-  Bench bench;
-  bench.pass(1);
+  Bench bench(1);
   bench.supervisor.stop(Commander::page);
   bench.supervisor.stop(Commander::topic);
   bench.pass(1);
   EXPECT_EQ(bench.supervisor.text(), "hold: held (by the page and a program on the topic: start there, or with force)");
-  bench.start(Commander::program);
-  EXPECT_FALSE(bench.moves());
-  bench.start(Commander::page);
-  EXPECT_FALSE(bench.moves());
+  EXPECT_FALSE(bench.moves_after_start(Commander::program));
+  EXPECT_FALSE(bench.moves_after_start(Commander::page));
   EXPECT_EQ(bench.supervisor.text(), "hold: held (by a program on the topic: start there, or with force)");
-  bench.start(Commander::topic);
-  EXPECT_TRUE(bench.moves());
+  EXPECT_TRUE(bench.moves_after_start(Commander::topic));
   bench.supervisor.stop(Commander::topic);
   bench.pass(1);
-  bench.supervisor.start(Commander::page, bench.now, true);
-  EXPECT_TRUE(bench.moves());
+  EXPECT_TRUE(bench.moves_after_start(Commander::page, true));
 }
 
 // Each program on the topic holds for itself.
 TEST(Supervisor, AnotherProgramOnTheTopicDoesNotLetGo) {
-  Bench bench;
-  bench.pass(1);
+  Bench bench(1);
   bench.supervisor.stop({Commander::topic, 1});
   bench.pass(1);
-  bench.start({Commander::topic, 2});
-  EXPECT_FALSE(bench.moves());
-  bench.start({Commander::topic, 1});
-  EXPECT_TRUE(bench.moves());
+  EXPECT_FALSE(bench.moves_after_start({Commander::topic, 2}));
+  EXPECT_TRUE(bench.moves_after_start({Commander::topic, 1}));
 }
 
 TEST(Supervisor, AStartThatWasSaidBeforeTheHoldIsVoid) {
-  Bench bench;
-  bench.pass(1);
+  Bench bench(1);
   const double before_s = bench.now;
   bench.pass(0.3);
   bench.operating_state = OperatingState::fault;
@@ -331,8 +322,7 @@ TEST(Supervisor, AStartThatWasSaidBeforeTheHoldIsVoid) {
 // Armed or not.
 TEST(Supervisor, WhatIsReportedNeedsAStart) {
   for (const double after_s : {0.0, 0.3, 1.0}) {
-    Bench bench;
-    bench.pass(after_s);
+    Bench bench(after_s);
     bench.supervisor.report(Blocked::second_camera);
     bench.supervisor.tell_loop("");
     bench.pass(0.3);
@@ -354,17 +344,15 @@ TEST(Supervisor, WithoutTheOperatorNothingMoves) {
   present = false;
   bench.pass(0.5);
   EXPECT_FALSE(bench.moves(1));
-  bench.supervisor.start(Commander::topic, bench.now, true);
+  bench.start(Commander::topic, true);
   EXPECT_FALSE(bench.moves(1));
   present = true;
   EXPECT_FALSE(bench.moves(1));
-  bench.start();
-  EXPECT_TRUE(bench.moves());
+  EXPECT_TRUE(bench.moves_after_start());
 }
 
 TEST(Supervisor, AHoldOfTheLoopOfMoreThanTwoSecondsNeedsAStart) {
-  Bench bench;
-  bench.pass(1);
+  Bench bench(1);
   for (const double held_s : {1.9, 2.1}) {
     bench.supervisor.tell_loop("marker_lost");
     bench.pass(held_s);
@@ -380,12 +368,11 @@ TEST(Supervisor, AHoldOfTheLoopOfMoreThanTwoSecondsNeedsAStart) {
 }
 
 TEST(Supervisor, TheEndIsForGood) {
-  Bench bench;
-  bench.pass(1);
+  Bench bench(1);
   bench.supervisor.end();
   EXPECT_TRUE(bench.released);
   bench.pass(0.5);
-  bench.supervisor.start(Commander::program, bench.now, true);
+  bench.start(Commander::program, true);
   EXPECT_FALSE(bench.moves(2));
 }
 

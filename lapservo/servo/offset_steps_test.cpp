@@ -8,8 +8,7 @@
 #include "lapservo/core/minimum_jerk.h"
 #include "lapservo/core/random.h"
 
-namespace lapservo::internal {
-namespace offset_steps_test {
+namespace lapservo::internal::offset_steps_test {
 
 constexpr double period_s = 1 / 60.0;
 
@@ -184,5 +183,4 @@ TEST(OffsetSteps, IgnoresTimeThatGoesBackAndWhatWasInterrupted) {
   EXPECT_FALSE(steps.add(swing.next({0.1, 0.1, 0.01}), true));
 }
 
-}  // namespace offset_steps_test
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::offset_steps_test

@@ -2,13 +2,11 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
+#include <atomic>
 #include <cmath>
-#include <condition_variable>
 #include <cstdio>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <utility>
 
@@ -36,6 +34,7 @@
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/rigs.h"
 #include "lapservo/testing/temporary_folder.h"
+#include "lapservo/testing/wait_for.h"
 
 namespace lapservo::internal {
 namespace {
@@ -55,9 +54,6 @@ struct Case {
   TrackingThread thread = TrackingThread::callers;
   std::optional<EndoscopeMotion> endoscope{};
   bool operated = true;  ///< then somebody moves the released arm, and says start
-  double exposure_s = 0;
-  float smoke = 0;
-  std::vector<Blotch> blotches{};
   std::optional<Interval> dark{};
   std::optional<double> arm_error_rad{};  ///< of the arm that holds the endoscope: then its pose is known but for this
   std::function<void(SimulatorConfig&)> change{};
@@ -172,9 +168,6 @@ class Watcher : public RunObserver {
   OperatedArm* operated_;
 };
 
-// So long a wait means that something hangs.
-constexpr std::chrono::seconds hangs(60);
-
 const JointVector start{0.05, 1.57, 0.064, 1.2};
 
 SimulatorConfig without_pictures() {
@@ -191,9 +184,6 @@ PastRun run_case(const Case& c) {
   SimulatorConfig simulated;
   simulated.seed = c.seed;
   simulated.endoscope.latency_s = c.latency_s;
-  simulated.endoscope.exposure_s = c.exposure_s;
-  simulated.render.smoke = c.smoke;
-  simulated.blotches = c.blotches;
   if (c.change) c.change(simulated);
   Random random(c.seed);
   const Trajectory trajectory = small_trajectory();
@@ -251,10 +241,9 @@ TEST(Run, FollowsThePapersTrajectoryFromARandomStart) {
 TEST(Run, IsNotSilentlyWrongWhereTheRigIs) {
   const Rig rig = testing::small_test_rig();
   const auto last_of = [&](const Rig& believed) {
-    const Case c;
     Simulator simulator(rig, {}, start);
     Watcher watcher(rig, simulator);
-    run(simulator, simulator, simulator, config_of(believed, c), small_trajectory(), 1, watcher);
+    run(simulator, simulator, simulator, config_of(believed, {}), small_trajectory(), 1, watcher);
     return watcher.done.records.back().decision;
   };
   EXPECT_FALSE(last_of(rig).registration_contradicted);
@@ -277,29 +266,33 @@ TEST(Run, IsNotSilentlyWrongWhereTheRigIs) {
 
 constexpr double endoscope_moves_s = 2.5;
 
+Eigen::Vector3d direction(Random& random) {
+  return Eigen::Vector3d(random.normal(), random.normal(), random.normal()).normalized();
+}
+
+// Whether the camera sees the marker and the shaft beside it, whose colour is needed too.
+bool shows(const Rig& rig, const Rigid3& camera_from_unrolled) {
+  constexpr double beyond_m = 0.012, margin_px = 40;
+  for (const double along_m : {-beyond_m, rig.instruments[0].marker.length_m() + beyond_m}) {
+    const Eigen::Vector3d point = camera_from_unrolled * Eigen::Vector3d(0, 0, along_m);
+    if (point.z() <= 0.03 || !rig.camera.contains(rig.camera.raw_from_point(point), margin_px)) return false;
+  }
+  return true;
+}
+
 // As far as the table of what must be shown says, and so that marker and trajectory stay in reach.
 EndoscopeMotion random_motion(const Rig& rig, double duration_s, Random& random) {
-  constexpr double translation_m = 0.03, rotation_rad = rad_from_deg(20), margin_px = 40;
-  const Instrument& instrument = rig.instruments[0];
-  const auto direction = [&random] {
-    return Eigen::Vector3d(random.normal(), random.normal(), random.normal()).normalized();
-  };
+  constexpr double translation_m = 0.03, rotation_rad = rad_from_deg(20);
   ControllerConfig controller;
   controller.window = image_window(rig.camera, 10);
   const auto q =
       newton_inverse(feature_model(rig), small_trajectory().at(endoscope_moves_s).features, start.vector(), {});
   while (true) {
-    const EndoscopeMotion motion{endoscope_moves_s, duration_s, translation_m * direction(),
-                                 rotation_rad * direction()};
+    const EndoscopeMotion motion{endoscope_moves_s, duration_s, translation_m * direction(random),
+                                 rotation_rad * direction(random)};
     const Rigid3 moved =
-        Rigid3{rotation_by(motion.rotation_rad), motion.translation_m}.inverse() * *instrument.camera_from_rcm;
-    const Rigid3 unrolled = moved * rcm_from_unrolled(JointVector::from_vector(q->q));
-    const double beyond_m = 0.012;  // of the shaft, whose colour is needed too
-    const auto shows = [&](double along_m) {
-      const Eigen::Vector3d point = unrolled * Eigen::Vector3d(0, 0, along_m);
-      return point.z() > 0.03 && rig.camera.contains(rig.camera.raw_from_point(point), margin_px);
-    };
-    if (!shows(-beyond_m) || !shows(instrument.marker.length_m() + beyond_m)) continue;
+        Rigid3{rotation_by(motion.rotation_rad), motion.translation_m}.inverse() * *rig.instruments[0].camera_from_rcm;
+    if (!shows(rig, moved * rcm_from_unrolled(JointVector::from_vector(q->q)))) continue;
     const std::string refused = testing::input_error(
         [&] { refuse_infeasible(small_trajectory(), 9, feature_model(rig, moved), controller, start, ""); });
     if (refused.empty()) return motion;
@@ -326,20 +319,20 @@ std::vector<Blotch> blood() {
 // Images with motion in them: dark for a while; and blurred, veiled, stained and dark at once.
 TEST(Run, IsNeverWrongByPicturesThatAreHardToRead) {
   Case darkened;
-  darkened.dark = Interval{2, 2.6};
+  darkened.duration_s = 5, darkened.dark = Interval{2, 2.6};
   Case all = darkened;
-  all.exposure_s = 0.015, all.smoke = 0.35F;
-  all.blotches = blood();
+  all.change = [](SimulatorConfig& c) {
+    c.endoscope.exposure_s = 0.015, c.render.smoke = 0.35F;
+    c.blotches = blood();
+  };
   const ControllerConfig controller = config_of(testing::small_test_rig(), all).controller;
-  for (Case c : {darkened, all}) {
-    SCOPED_TRACE(::testing::Message() << c.exposure_s << " " << c.smoke << " " << c.blotches.size());
-    c.duration_s = 5;
+  for (const Case& c : {darkened, all}) {
+    SCOPED_TRACE(c.change ? "all" : "dark");
     const PastRun done = run_case(c);
     for (const Record& record : done.records) {
       EXPECT_EQ(record.decision.registration, 0);
       const double time_s = record.input.time_s;
-      if (!c.dark || time_s < c.dark->begin_s + 0.1 + 2 * controller.period_s || time_s > c.dark->end_s + 0.07)
-        continue;
+      if (time_s < c.dark->begin_s + 0.1 + 2 * controller.period_s || time_s > c.dark->end_s + 0.07) continue;
       EXPECT_EQ(record.decision.control.action, ControlAction::hold) << time_s;
     }
     expect_right_where_ok(done, c.latency_s, controller.period_s);
@@ -357,12 +350,6 @@ std::vector<LoggedTick> logged(const PastRun& done) {
   return read_servo_log(folder / "log.csv");
 }
 
-// The task within 5 mrad and so many pixels.
-bool is_right(const PastRun& done, std::size_t k, double max_px) {
-  return done.records[k].truth.features && std::abs(done.error(k)[0]) < 5e-3 &&
-         done.error(k).tail<3>().cwiseAbs().maxCoeff() < max_px;
-}
-
 // From the moment on in which the loop released the arm nothing was sent, nor was another registration gone by, until
 // the operator said start.
 void expect_nothing_until_start(const PastRun& done) {
@@ -377,7 +364,9 @@ void expect_nothing_until_start(const PastRun& done) {
   }
 }
 
+// Right: the task within 5 mrad and a pixel.
 void expect_measured_anew(const Rig& rig, const Case& c) {
+  const Eigen::Array4d right(5e-3, 1, 1, 1);
   const PastRun done = run_case(c);
   const ControllerConfig controller = config_of(rig, c).controller;
   std::optional<double> held_s, started_s;
@@ -388,7 +377,7 @@ void expect_measured_anew(const Rig& rig, const Case& c) {
     if (since_s < 0) continue;
     if (!held_s && decision.control.action == ControlAction::hold) held_s = since_s;
     if (!started_s && decision.registration == 2) started_s = since_s;
-    if (!is_right(done, k, 1)) wrong_s = since_s;
+    if (!(done.error(k).array().abs() < right).all()) wrong_s = since_s;
   }
   ASSERT_TRUE(held_s && started_s);
   const auto difference = replay(logged(done), rig, controller);
@@ -504,17 +493,13 @@ TEST(Run, HoldsAnEndoscopeThatMovesSmoothlyAsSoonAsThatIsPlain) {
 // image: as far from the RCM's image as before, which moves.
 EndoscopeMotion reachable_motion(const Rig& rig, const ControllerConfig& config, MotionProfile profile, double begin_s,
                                  Random& random) {
-  const Instrument& instrument = rig.instruments[0];
-  const auto direction = [&random] {
-    return Eigen::Vector3d(random.normal(), random.normal(), random.normal()).normalized();
-  };
-  constexpr double step_s = 0.05, margin_px = 40, beyond_m = 0.012;
+  constexpr double step_s = 0.05;
   const Eigen::Vector4d margin(0.1, 0.1, 0.005, 0.2);
   const auto is_followed = [&](const EndoscopeMotion& motion) {
     const EndoscopeOfAnArm held(motion, 0);
     Eigen::Vector4d q = start.vector();
     for (double time_s = 0; time_s < begin_s + 8; time_s += step_s) {
-      const Rigid3 camera_from_rcm = held.first_from_camera(time_s)->inverse() * *instrument.camera_from_rcm;
+      const Rigid3 camera_from_rcm = held.first_from_camera(time_s)->inverse() * *rig.instruments[0].camera_from_rcm;
       const auto found =
           newton_inverse(feature_model(rig, camera_from_rcm), small_trajectory().at(time_s).features, q, {});
       if (!found || !found->converged) return false;
@@ -522,17 +507,14 @@ EndoscopeMotion reachable_motion(const Rig& rig, const ControllerConfig& config,
       q = found->q;
       if ((q.array() < (config.limits.lower + margin).array()).any() ||
           (q.array() > (config.limits.upper - margin).array()).any() ||
-          (time_s > 0 && (rate > 0.8 * config.limits.rate.array()).any()))
+          (time_s > 0 && (rate > 0.8 * config.limits.rate.array()).any()) ||
+          !shows(rig, camera_from_rcm * rcm_from_unrolled(JointVector::from_vector(q))))
         return false;
-      const Rigid3 unrolled = camera_from_rcm * rcm_from_unrolled(JointVector::from_vector(q));
-      for (const double along_m : {-beyond_m, instrument.marker.length_m() + beyond_m})
-        if (!rig.camera.contains(rig.camera.raw_from_point(unrolled * Eigen::Vector3d(0, 0, along_m)), margin_px))
-          return false;
     }
     return true;
   };
   while (true) {
-    const EndoscopeMotion motion{begin_s, 4, 0.02 * direction(), 0.2 * direction(), profile};
+    const EndoscopeMotion motion{begin_s, 4, 0.02 * direction(random), 0.2 * direction(random), profile};
     if (is_followed(motion)) return motion;
   }
 }
@@ -660,62 +642,32 @@ TEST(Run, RepeatsAndReplaysBitForBit) {
   }
 }
 
-// Vision that is at its first image until somebody ends it.
-class EndlessVision : public ImageStream {
- public:
+// Vision that is at its first image until the last tick, of which it is the observer.
+struct EndlessVision : ImageStream, RunObserver {
+  static constexpr int ticks = 60;
   std::optional<StampedImage> newest() override {
-    std::unique_lock lock(mutex_);
-    begun_ = true;
-    changed_.notify_all();
-    if (!changed_.wait_for(lock, hangs / 6, [this] { return ended_; })) gave_up_ = true;
+    begun = true;
+    if (!testing::wait_for([this] { return ended.load(); })) gave_up = true;
     return std::nullopt;
   }
-  void wait_until_begun() {
-    std::unique_lock lock(mutex_);
-    EXPECT_TRUE(changed_.wait_for(lock, hangs, [this] { return begun_; }));
-  }
-  void end() {
-    const std::lock_guard lock(mutex_);
-    ended_ = true;
-    changed_.notify_all();
-  }
-  bool gave_up() const { return gave_up_; }
-
- private:
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  bool begun_ = false, ended_ = false, gave_up_ = false;
-};
-
-// Ends vision with the last of its ticks.
-class TicksDuringVision : public RunObserver {
- public:
-  TicksDuringVision(EndlessVision& vision, int ticks) : vision_(vision), ticks_(ticks) {}
   bool on_tick(const ControlTick& tick) override {
-    vision_.wait_until_begun();
+    EXPECT_TRUE(testing::wait_for([this] { return begun.load(); }));
     sent += tick.decision.send;
-    if (++done == ticks_) vision_.end();
+    ended = ++done >= ticks;
     return true;
   }
+  std::atomic<bool> begun = false, ended = false, gave_up = false;
   int done = 0, sent = 0;
-
- private:
-  EndlessVision& vision_;
-  int ticks_;
 };
 
 TEST(Run, SetPointsDoNotWaitForVisionInItsOwnThread) {
-  constexpr int ticks = 60;
   const Rig rig = testing::small_test_rig();
   Simulator simulator(rig, without_pictures(), start);
-  Case c;
-  c.thread = TrackingThread::own;
   EndlessVision vision;
-  TicksDuringVision watcher(vision, ticks);
-  run(simulator, vision, simulator, config_of(rig, c), small_trajectory(), 1, watcher);
-  EXPECT_FALSE(vision.gave_up());
-  EXPECT_EQ(watcher.done, ticks);
-  EXPECT_EQ(watcher.sent, ticks);
+  run(simulator, vision, simulator, config_of(rig, {.thread = TrackingThread::own}), small_trajectory(), 1, vision);
+  EXPECT_FALSE(vision.gave_up);
+  EXPECT_EQ(vision.done, EndlessVision::ticks);
+  EXPECT_EQ(vision.sent, EndlessVision::ticks);
 }
 
 // A camera whose third image is of another size.
@@ -741,15 +693,15 @@ TEST(Run, WhatVisionThrowsInItsOwnThreadEndsTheRunAndReleasesTheArm) {
   class Whoever : public RunObserver {
     bool on_tick(const ControlTick&) override { return true; }
   } nobody;
+  constexpr double hangs_s = 60;
   const Rig rig = testing::small_test_rig();
   Simulator simulator(rig, without_pictures(), start);
   Driven arm(simulator);
   SteadyClock clock;
-  Case c;
-  c.thread = TrackingThread::own;
   WrongThirdImage camera(rig);
-  const std::string said = testing::input_error(
-      [&] { run(arm, camera, clock, config_of(rig, c), small_trajectory(), hangs.count(), nobody); });
+  const RunConfig config = config_of(rig, {.thread = TrackingThread::own});
+  const std::string said =
+      testing::input_error([&] { run(arm, camera, clock, config, small_trajectory(), hangs_s, nobody); });
   EXPECT_EQ(said, "image: size: is 20x10, expected 640x360 as in the rig");
   EXPECT_TRUE(arm.released);
 }
@@ -891,11 +843,9 @@ struct Refused {
 
 // The refusal of a run, in which nothing moved.
 std::string refusal_of(const Refused& refused) {
-  Case c;
-  c.mode = refused.mode;
   Rig rig = testing::small_test_rig();
   rig.instruments[0].tool.emplace().place.emplace().base_in_marker_m = {0, 0, 0.045};
-  RunConfig config = config_of(rig, c);
+  RunConfig config = config_of(rig, {.mode = refused.mode});
   config.rcm_px = rcm_image_px(rig, {});
   config.trajectory_name = "fast.csv";
   if (!refused.registered) config.rig.instruments[0].camera_from_rcm.reset();

@@ -17,8 +17,7 @@
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
 
-namespace lapservo::internal {
-namespace servo_log_test {
+namespace lapservo::internal::servo_log_test {
 
 constexpr std::uint64_t seed = 5;
 
@@ -180,5 +179,4 @@ TEST(ServoLog, NamesWhatIsWrong) {
   EXPECT_FALSE(testing::input_error([&] { read_servo_log(folder / "none.csv"); }).empty());
 }
 
-}  // namespace servo_log_test
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::servo_log_test

@@ -16,8 +16,7 @@
 #include "lapservo/servo/registration_watch.h"
 #include "lapservo/testing/rigs.h"
 
-namespace lapservo::internal {
-namespace servo_test {
+namespace lapservo::internal::servo_test {
 
 const Eigen::Vector4d start(0.05, 1.57, 0.064, 1.2);
 
@@ -450,5 +449,4 @@ TEST(MovedEndoscope, IsNoEncoderThatIsSetWhileTheArmIsNotEnabled) {
   EXPECT_EQ(world.steps(120).registration, 0);
 }
 
-}  // namespace servo_test
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::servo_test
