@@ -54,7 +54,6 @@ struct Flaws {
   Eigen::Vector4d offset = Eigen::Vector4d::Zero();    ///< true joints minus measured joints
   Eigen::Vector4d backlash = Eigen::Vector4d::Zero();  ///< full backlash, joint by joint
   double lag_s = 0;                                    ///< of the arm, first order
-  double faulty_s = 0;                                 ///< from when on `answer` holds
   Eigen::Vector4d answer = Eigen::Vector4d::Ones();    ///< the instrument's motion per motion of the motors
   Eigen::Vector4d resolution{1e-5, 1e-5, 2e-6, 1e-4};  ///< of the measured joints
   Eigen::Vector4d noise{4e-4, 0.15, 0.15, 0.15};       ///< of the image
@@ -137,8 +136,7 @@ class TestSimulator {
       motor_ += fraction * (setpoint - motor_);
       const Eigen::Vector4d before = q_driven_;
       q_driven_ = q_driven_.cwiseMax(motor_ - flaws_.backlash / 2).cwiseMin(motor_ + flaws_.backlash / 2);
-      const Eigen::Vector4d answer = from_s < flaws_.faulty_s ? Eigen::Vector4d::Ones() : flaws_.answer;
-      q_instrument_ += answer.cwiseProduct(q_driven_ - before);
+      q_instrument_ += flaws_.answer.cwiseProduct(q_driven_ - before);
     }
     moved_s_ = to_s;
   }

@@ -40,11 +40,13 @@ namespace lapservo::internal {
 namespace {
 
 // The trajectory as the half-size camera sees it.
-Trajectory small_trajectory() {
+Sinusoids small_sinusoids() {
   Sinusoids f = paper_sinusoids();
-  f.offset.tail<3>() /= 2;
-  f.amplitude.tail<3>() /= 2;
-  return sinusoids(f);
+  f.offset.tail<3>() /= 2, f.amplitude.tail<3>() /= 2;
+  return f;
+}
+Trajectory small_trajectory() {
+  return sinusoids(small_sinusoids());
 }
 
 struct Case {
@@ -219,7 +221,7 @@ void expect_within_limits(const PastRun& done, const ControllerConfig& config) {
 TEST(Run, FollowsThePapersTrajectoryFromARandomStart) {
   for (const std::uint64_t seed : {1, 2}) {
     SCOPED_TRACE(seed);
-    const PastRun done = run_case({seed, 0.08, 8, ControlMode::fused});
+    const PastRun done = run_case({.seed = seed});
     ASSERT_TRUE(done.convergence.reached_s());
     EXPECT_LE(*done.convergence.reached_s(), 5);
     Eigen::Vector4d squares = Eigen::Vector4d::Zero(), sum = squares;
@@ -281,7 +283,7 @@ bool shows(const Rig& rig, const Rigid3& camera_from_unrolled) {
 }
 
 // As far as the table of what must be shown says, and so that marker and trajectory stay in reach.
-EndoscopeMotion random_motion(const Rig& rig, double duration_s, Random& random) {
+EndoscopeMotion random_motion(const Rig& rig, double duration_s, MotionProfile profile, Random& random) {
   constexpr double translation_m = 0.03, rotation_rad = rad_from_deg(20);
   ControllerConfig controller;
   controller.window = image_window(rig.camera, 10);
@@ -289,7 +291,7 @@ EndoscopeMotion random_motion(const Rig& rig, double duration_s, Random& random)
       newton_inverse(feature_model(rig), small_trajectory().at(endoscope_moves_s).features, start.vector(), {});
   while (true) {
     const EndoscopeMotion motion{endoscope_moves_s, duration_s, translation_m * direction(random),
-                                 rotation_rad * direction(random)};
+                                 rotation_rad * direction(random), profile};
     const Rigid3 moved =
         Rigid3{rotation_by(motion.rotation_rad), motion.translation_m}.inverse() * *rig.instruments[0].camera_from_rcm;
     if (!shows(rig, moved * rcm_from_unrolled(JointVector::from_vector(q->q)))) continue;
@@ -397,10 +399,8 @@ TEST(Run, GoesOnAfterStartWhereTheEndoscopeMoved) {
   Random random(1);
   for (const double duration_s : {0.0, 0.6}) {
     SCOPED_TRACE(duration_s);
-    Case c;
-    c.duration_s = 14;
-    c.endoscope = random_motion(rig, duration_s, random);
-    expect_measured_anew(rig, c);
+    expect_measured_anew(rig,
+                         {.duration_s = 14, .endoscope = random_motion(rig, duration_s, MotionProfile::even, random)});
   }
 }
 
@@ -446,6 +446,9 @@ int endoscopes() {
 std::uint64_t endoscope_seed() {
   return static_cast<std::uint64_t>(testing::from_environment("LAPSERVO_ENDOSCOPE_SEED", 1));
 }
+std::uint64_t endoscope_run_seed(int i) {
+  return 100 * endoscope_seed() + static_cast<std::uint64_t>(i);
+}
 
 // An even motion is plain at once; from rest to rest it shows little at first and gains speed from image to image.
 // LAPSERVO_ENDOSCOPES=10 LAPSERVO_ENDOSCOPE_SEED=2: ten of each, and others.
@@ -458,14 +461,10 @@ TEST(Run, HoldsAnEndoscopeThatMovesWhenThatIsPlain) {
       const char* name = profile == MotionProfile::smooth ? "smooth" : "even";
       SCOPED_TRACE(::testing::Message() << name << " " << duration_s);
       HeldAfter after;
-      for (int i = 0; i < endoscopes(); ++i) {
-        Case c;
-        c.seed = 100 * endoscope_seed() + static_cast<std::uint64_t>(i);
-        c.endoscope = random_motion(rig, duration_s, random);
-        c.endoscope->profile = profile;
-        c.duration_s = endoscope_moves_s + duration_s / 2 + 0.5;
-        after.add(rig, c);
-      }
+      for (int i = 0; i < endoscopes(); ++i)
+        after.add(rig, {.seed = endoscope_run_seed(i),
+                        .duration_s = endoscope_moves_s + duration_s / 2 + 0.5,
+                        .endoscope = random_motion(rig, duration_s, profile, random)});
       std::printf(
           "%s %.1f s: held %.3f s after the beginning, %+.3f (latest %+.3f) after it is plain, in time %d of %d\n",
           name, duration_s, after.held_s / after.runs, after.plain_s / after.runs, after.latest_plain_s, after.in_time,
@@ -479,12 +478,9 @@ TEST(Run, HoldsAnEndoscopeThatMovesSmoothlyAsSoonAsThatIsPlain) {
   Random random(1);
   for (const double duration_s : {1.0, 2.0}) {
     SCOPED_TRACE(duration_s);
-    Case c;
-    c.endoscope = random_motion(rig, duration_s, random);
-    c.endoscope->profile = MotionProfile::smooth;
-    c.duration_s = endoscope_moves_s + duration_s / 2;
     HeldAfter after;
-    after.add(rig, c);
+    after.add(rig, {.duration_s = endoscope_moves_s + duration_s / 2,
+                    .endoscope = random_motion(rig, duration_s, MotionProfile::smooth, random)});
     EXPECT_EQ(after.in_time, 1);
   }
 }
@@ -524,19 +520,18 @@ EndoscopeMotion reachable_motion(const Rig& rig, const ControllerConfig& config,
 // twice as much by its way.
 TEST(Run, TracksOnWhileAnArmMovesTheEndoscope) {
   const Rig rig = testing::small_test_rig();
+  const ControllerConfig controller = config_of(rig, {}).controller;
   Random random(endoscope_seed());
   constexpr double begin_s = 5;
   for (const double arm_error_rad : {0.0, 1e-3})
     for (const auto profile : {MotionProfile::even, MotionProfile::smooth})
       for (int i = 0; i < endoscopes(); ++i) {
-        Case c;
-        c.arm_error_rad = arm_error_rad;
-        c.operated = false;
-        c.seed = 100 * endoscope_seed() + static_cast<std::uint64_t>(i);
-        const ControllerConfig controller = config_of(rig, c).controller;
-        c.endoscope = reachable_motion(rig, controller, profile, begin_s, random);
-        c.duration_s = begin_s + 8;
-        const PastRun done = run_case(c);
+        const std::uint64_t seed = endoscope_run_seed(i);
+        const PastRun done = run_case({.seed = seed,
+                                       .duration_s = begin_s + 8,
+                                       .endoscope = reachable_motion(rig, controller, profile, begin_s, random),
+                                       .operated = false,
+                                       .arm_error_rad = arm_error_rad});
         Eigen::Vector4d meanwhile = Eigen::Vector4d::Zero(), after = meanwhile;
         int held = 0;
         for (const Record& record : done.records) {
@@ -552,7 +547,7 @@ TEST(Run, TracksOnWhileAnArmMovesTheEndoscope) {
         std::printf(
             "%s, arm off by %.0f mrad, seed %d: s %.2f mrad, r %.2f, l %.2f, d %.2f px meanwhile; s %.2f mrad, r "
             "%.2f, l %.2f, d %.2f px after; %d ticks held\n",
-            name, 1e3 * arm_error_rad, static_cast<int>(c.seed), 1e3 * meanwhile[0], meanwhile[1], meanwhile[2],
+            name, 1e3 * arm_error_rad, static_cast<int>(seed), 1e3 * meanwhile[0], meanwhile[1], meanwhile[2],
             meanwhile[3], 1e3 * after[0], after[1], after[2], after[3], held);
         EXPECT_EQ(held, 0);
         EXPECT_LE(meanwhile.tail<3>().maxCoeff(), 3);
@@ -567,12 +562,8 @@ TEST(Run, TracksOnWhileAnArmMovesTheEndoscope) {
 TEST(Run, HoldsWhereImagesContradictTheArmThatHoldsTheEndoscope) {
   Random random(1);
   const Rig rig = testing::small_test_rig();
-  Case c;
-  c.arm_error_rad = 0.2;
-  c.operated = false;
-  c.endoscope = reachable_motion(rig, config_of(rig, c).controller, MotionProfile::even, 3, random);
-  c.duration_s = 6;
-  const PastRun done = run_case(c);
+  const EndoscopeMotion motion = reachable_motion(rig, config_of(rig, {}).controller, MotionProfile::even, 3, random);
+  const PastRun done = run_case({.duration_s = 6, .endoscope = motion, .operated = false, .arm_error_rad = 0.2});
   const ServoDecision& last = done.records.back().decision;
   EXPECT_EQ(last.control.reason, HoldReason::endoscope_moved);
   EXPECT_FALSE(last.remedy.empty());
@@ -604,11 +595,8 @@ TEST(Run, DoesNotHoldAnEndoscopeThatRests) {
   for (const auto& [name, change] : resting()) {
     int held_here = 0;
     for (int i = 0; i < endoscopes(); ++i) {
-      Case c;
-      c.change = change;
-      c.seed = 100 * endoscope_seed() + static_cast<std::uint64_t>(i);
-      c.duration_s = 5;
-      for (const Record& record : run_case(c).records)
+      const PastRun done = run_case({.seed = endoscope_run_seed(i), .duration_s = 5, .change = change});
+      for (const Record& record : done.records)
         ++ticks, held_here += record.decision.control.reason == HoldReason::endoscope_moved;
     }
     if (held_here > 0) std::printf("%s: held in %d ticks\n", name, held_here);
@@ -620,9 +608,7 @@ TEST(Run, DoesNotHoldAnEndoscopeThatRests) {
 
 // The same seed gives the same run, and the log is enough to decide everything again.
 TEST(Run, RepeatsAndReplaysBitForBit) {
-  Case c;
-  c.seed = 4;
-  c.duration_s = 2;
+  const Case c{.seed = 4, .duration_s = 2};
   Case by_paper = c, of_moving_endoscope = c;
   by_paper.mode = ControlMode::paper;
   of_moving_endoscope.endoscope = {0.3, 1, {0.005, -0.005, 0}, {0, 0.05, 0.05}, MotionProfile::smooth};
@@ -863,8 +849,7 @@ std::string refusal_of(const Refused& refused) {
 
 TEST(Run, RefusesWhatCanNotBeFollowedNamingTimeAndLimit) {
   EXPECT_EQ(refusal_of({}), "");
-  Sinusoids fast = paper_sinusoids();
-  fast.offset.tail<3>() /= 2, fast.amplitude.tail<3>() /= 2;
+  Sinusoids fast = small_sinusoids();
   fast.omega_rad_s.setConstant(12);
   const std::string complaint = refusal_of({.trajectory = sinusoids(fast)});
   EXPECT_EQ(complaint.find("fast.csv: can't be followed at "), 0U) << complaint;

@@ -9,6 +9,7 @@
 #include <string>
 #include <sys/stat.h>
 #include <thread>
+#include <tuple>
 #include <unistd.h>
 
 #include <gtest/gtest.h>
@@ -68,35 +69,24 @@ Record any_record(Random& random, int kind) {
 }
 
 void expect_same_bits(const ServoInput& a, const ServoInput& b) {
-  EXPECT_EQ(a.time_s, b.time_s);
-  EXPECT_EQ(a.joints.q.vector(), b.joints.q.vector());
-  EXPECT_EQ(a.joints.operating_state, b.joints.operating_state);
-  EXPECT_EQ(a.joints.follows, b.joints.follows);
-  EXPECT_EQ(a.joints.started, b.joints.started);
+  const auto joints = [](const ServoInput& i) {
+    return std::tuple(i.time_s, i.joints.q.vector(), i.joints.operating_state, i.joints.follows, i.joints.started);
+  };
+  EXPECT_EQ(joints(a), joints(b));
+  const auto reading = [](const JointReading& r) { return std::tuple(r.time_s, r.q.vector()); };
   ASSERT_EQ(a.readings.size(), b.readings.size());
-  for (std::size_t i = 0; i < a.readings.size(); ++i) {
-    EXPECT_EQ(a.readings[i].time_s, b.readings[i].time_s);
-    EXPECT_EQ(a.readings[i].q.vector(), b.readings[i].q.vector());
-  }
-  EXPECT_EQ(a.desired.features, b.desired.features);
-  EXPECT_EQ(a.desired.rate, b.desired.rate);
-  EXPECT_EQ(a.desired.acceleration, b.desired.acceleration);
+  for (std::size_t i = 0; i < a.readings.size(); ++i) EXPECT_EQ(reading(a.readings[i]), reading(b.readings[i]));
+  const auto goal = [](const DesiredFeatures& d) { return std::tuple(d.features, d.rate, d.acceleration); };
+  EXPECT_EQ(goal(a.desired), goal(b.desired));
   ASSERT_EQ(a.image.has_value(), b.image.has_value());
   if (!a.image) return;
-  EXPECT_EQ(a.image->found, b.image->found);
-  EXPECT_EQ(a.image->time_s, b.image->time_s);
-  EXPECT_EQ(a.image->registration, b.image->registration);
-  EXPECT_EQ(a.image->repetition, b.image->repetition);
-  ASSERT_EQ(a.image->camera_from_marker.has_value(), b.image->camera_from_marker.has_value());
-  if (const auto& seen = a.image->camera_from_marker) {
-    EXPECT_EQ(seen->translation, b.image->camera_from_marker->translation);
-    EXPECT_EQ(seen->rotation.coeffs(), b.image->camera_from_marker->rotation.coeffs());
-  }
+  const auto frame = [](const ImageMeasurement& i) {
+    return std::tuple(i.found, i.time_s, i.registration, i.repetition, i.camera_from_marker);
+  };
+  EXPECT_EQ(frame(*a.image), frame(*b.image));
   if (!a.image->found && !a.image->camera_from_marker) return;
-  EXPECT_EQ(a.image->features, b.image->features);
-  EXPECT_EQ(a.image->covariance, b.image->covariance);
-  EXPECT_EQ(a.image->ends_px, b.image->ends_px);
-  EXPECT_EQ(a.image->q, b.image->q);
+  const auto numbers = [](const ImageMeasurement& i) { return std::tuple(i.features, i.covariance, i.ends_px, i.q); };
+  EXPECT_EQ(numbers(*a.image), numbers(*b.image));
 }
 
 TEST(ServoLog, ReadsBackToTheLastBit) {
