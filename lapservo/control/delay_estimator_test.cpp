@@ -7,7 +7,6 @@
 
 #include <gtest/gtest.h>
 
-#include "lapservo/core/angles.h"
 #include "lapservo/core/random.h"
 
 namespace lapservo::internal {

@@ -1,6 +1,5 @@
 #include "lapservo/control/motion_follower.h"
 
-#include <algorithm>
 #include <functional>
 #include <optional>
 #include <vector>

@@ -3,7 +3,6 @@
 #include <cmath>
 #include <optional>
 
-#include <Eigen/LU>
 #include <Eigen/SVD>
 #include <gtest/gtest.h>
 

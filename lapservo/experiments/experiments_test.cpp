@@ -1,6 +1,5 @@
 #include <cmath>
 
-#include <Eigen/Cholesky>
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 

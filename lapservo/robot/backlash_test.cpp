@@ -1,7 +1,6 @@
 #include "lapservo/robot/backlash.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include <gtest/gtest.h>
 

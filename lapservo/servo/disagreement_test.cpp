@@ -1,6 +1,6 @@
 #include "lapservo/servo/disagreement.h"
 
-#include <cmath>
+#include <algorithm>
 #include <cstdio>
 
 #include <gtest/gtest.h>

@@ -1,7 +1,5 @@
 #include "lapservo/servo/registration_fit.h"
 
-#include <cmath>
-
 #include <gtest/gtest.h>
 
 #include "lapservo/core/random.h"

@@ -1,12 +1,9 @@
 #include "lapservo/sim_robot/sim_robot.h"
 
-#include <cmath>
-
 #include <gtest/gtest.h>
 
 #include "lapservo/crtk/image_receiver.h"
 #include "lapservo/crtk/interlock.h"
-#include "lapservo/crtk/joint_map.h"
 #include "lapservo/crtk/test_transport.h"
 #include "lapservo/testing/rigs.h"
 #include "lapservo/testing/wait_for.h"
