@@ -1,6 +1,4 @@
 // The results of a calibration go into the rig, and all other keys stay.
-#include <array>
-#include <optional>
 
 #include <gtest/gtest.h>
 

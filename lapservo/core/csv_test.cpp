@@ -1,6 +1,5 @@
 #include "lapservo/core/csv.h"
 
-#include <cstdint>
 #include <limits>
 #include <sstream>
 #include <string>
@@ -8,8 +7,8 @@
 
 #include <gtest/gtest.h>
 
-#include "lapservo/core/random.h"
 #include "lapservo/testing/input_error.h"
+#include "lapservo/testing/seeded_random.h"
 
 namespace lapservo::internal {
 namespace {
@@ -20,8 +19,7 @@ std::string parse_error(std::string_view text) {
 }
 
 TEST(CsvTable, NumbersComeBackAsTheyWereWritten) {
-  constexpr std::uint64_t seed = 13;
-  Random random(seed);
+  testing::SeededRandom random(13);
   std::vector<double> written;
   std::ostringstream text;
   text.precision(std::numeric_limits<double>::max_digits10);
@@ -30,8 +28,7 @@ TEST(CsvTable, NumbersComeBackAsTheyWereWritten) {
     text << written.emplace_back(random.normal() * std::pow(10.0, random.uniform(-100, 100))) << '\n';
   const CsvTable table = CsvTable::parse(text.view(), "t.csv");
   ASSERT_EQ(table.rows(), written.size());
-  for (std::size_t row = 0; row < table.rows(); ++row)
-    EXPECT_EQ(table.number(row, "x"), written[row]) << "seed " << seed;
+  for (std::size_t row = 0; row < table.rows(); ++row) EXPECT_EQ(table.number(row, "x"), written[row]);
 }
 
 TEST(CsvTable, ToleratesCarriageReturnsBlanksEmptyLinesAByteOrderMarkAndNoLastNewline) {
@@ -49,17 +46,16 @@ TEST(CsvTable, ToleratesCarriageReturnsBlanksEmptyLinesAByteOrderMarkAndNoLastNe
 }
 
 TEST(CsvTable, TextsComeBackAsTheyWereWritten) {
-  constexpr std::uint64_t seed = 17;
   constexpr std::string_view letters = "a,\" \t.";
-  Random random(seed);
+  testing::SeededRandom random(17);
   for (int i = 0; i < 2000; ++i) {
     std::string first, second;
     for (std::string* text : {&first, &second})
       for (double length = random.uniform(0, 6); length > 0; --length) *text += letters[random.bits() % letters.size()];
     const CsvTable table = CsvTable::parse("x,y,z\n" + csv_field(first) + "," + csv_field(second) + ",end\n", "t.csv");
-    EXPECT_EQ(table.text(0, "x"), first) << "seed " << seed;
-    EXPECT_EQ(table.text(0, "y"), second) << "seed " << seed;
-    EXPECT_EQ(table.text(0, "z"), "end") << "seed " << seed;
+    EXPECT_EQ(table.text(0, "x"), first);
+    EXPECT_EQ(table.text(0, "y"), second);
+    EXPECT_EQ(table.text(0, "z"), "end");
   }
   EXPECT_EQ(csv_field("0001.png"), "0001.png");
   EXPECT_EQ(csv_field("a\nb"), "\"a\nb\"");

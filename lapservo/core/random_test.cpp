@@ -6,6 +6,8 @@
 
 #include <gtest/gtest.h>
 
+#include "lapservo/testing/seeded_random.h"
+
 namespace lapservo::internal {
 namespace random_test {
 namespace {
@@ -35,7 +37,7 @@ TEST(Random, IsSplitmix64) {
 }
 
 TEST(Random, UniformFillsItsIntervalEvenly) {
-  Random random(seed);
+  testing::SeededRandom random(seed);
   std::array<int, 10> counts{};
   for (int i = 0; i < draws; ++i) {
     const double x = random.uniform(-2, 3);
@@ -43,27 +45,27 @@ TEST(Random, UniformFillsItsIntervalEvenly) {
     ASSERT_LT(x, 3);
     ++counts.at(static_cast<std::size_t>((x + 2) * 2));
   }
-  for (const int count : counts) EXPECT_NEAR(count, draws / 10, 6 * std::sqrt(draws * 0.1 * 0.9)) << "seed " << seed;
+  for (const int count : counts) EXPECT_NEAR(count, draws / 10, 6 * std::sqrt(draws * 0.1 * 0.9));
 }
 
 TEST(Random, NormalHasTheMomentsOfTheStandardNormal) {
-  Random random(seed);
+  testing::SeededRandom random(seed);
   const Moments m = moments([&] { return random.normal(); });
   const double n = draws;
-  EXPECT_NEAR(m.mean, 0, 5 / std::sqrt(n)) << "seed " << seed;
-  EXPECT_NEAR(m.variance, 1, 5 * std::sqrt(2 / n)) << "seed " << seed;
-  EXPECT_NEAR(m.kurtosis, 3, 5 * std::sqrt(24 / n)) << "seed " << seed;
+  EXPECT_NEAR(m.mean, 0, 5 / std::sqrt(n));
+  EXPECT_NEAR(m.variance, 1, 5 * std::sqrt(2 / n));
+  EXPECT_NEAR(m.kurtosis, 3, 5 * std::sqrt(24 / n));
 }
 
 TEST(Random, SuccessiveNormalsAreUncorrelated) {
-  Random random(seed);
+  testing::SeededRandom random(seed);
   double last = random.normal(), sum = 0;
   for (int i = 0; i < draws; ++i) {
     const double next = random.normal();
     sum += last * next;
     last = next;
   }
-  EXPECT_NEAR(sum / draws, 0, 5 / std::sqrt(draws)) << "seed " << seed;
+  EXPECT_NEAR(sum / draws, 0, 5 / std::sqrt(draws));
 }
 
 }  // namespace

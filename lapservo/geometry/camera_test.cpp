@@ -9,7 +9,7 @@
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
-#include "lapservo/core/random.h"
+#include "lapservo/testing/seeded_random.h"
 
 namespace lapservo::internal {
 namespace {
@@ -70,27 +70,27 @@ TEST(Camera, PlumbBobOfOnePoint) {
 }
 
 TEST(Camera, TheRayThroughAPixelProjectsToIt) {
-  Random random(seed);
+  testing::SeededRandom random(seed);
   for (const auto& [name, camera] : lenses())
     for (int i = 0; i < 100; ++i) {
       const Eigen::Vector3d point = visible_point(camera, random);
       const Eigen::Vector2d ideal_px = camera.ideal_from_point(point);
       const Eigen::Vector3d ray = camera.ray_from_ideal(ideal_px);
       EXPECT_EQ(ray.z(), 1);
-      EXPECT_LT(ray.cross(point.normalized()).norm(), 1e-12) << name << ", seed " << seed;
+      EXPECT_LT(ray.cross(point.normalized()).norm(), 1e-12) << name;
       EXPECT_LT((camera.raw_from_point(point) - camera.raw_from_ideal(ideal_px)).norm(), 1e-9);
     }
 }
 
 TEST(Camera, JacobiansAreTheDerivatives) {
   constexpr double step_m = 1e-7;
-  Random random(seed);
+  testing::SeededRandom random(seed);
   for (const auto& [name, camera] : lenses())
     for (int i = 0; i < 200; ++i) {
       const Eigen::Vector3d point = visible_point(camera, random);
       const auto raw = camera.raw_with_jacobian(point), ideal = camera.ideal_with_jacobian(point);
-      EXPECT_LT((raw.point_px - camera.raw_from_point(point)).norm(), 1e-9) << name << ", seed " << seed;
-      EXPECT_LT((ideal.point_px - camera.ideal_from_point(point)).norm(), 1e-9) << name << ", seed " << seed;
+      EXPECT_LT((raw.point_px - camera.raw_from_point(point)).norm(), 1e-9) << name;
+      EXPECT_LT((ideal.point_px - camera.ideal_from_point(point)).norm(), 1e-9) << name;
       for (int axis = 0; axis < 3; ++axis) {
         const Eigen::Vector3d step = step_m * Eigen::Vector3d::Unit(axis);
         const Eigen::Vector2d raw_slope =
@@ -98,8 +98,8 @@ TEST(Camera, JacobiansAreTheDerivatives) {
         const Eigen::Vector2d ideal_slope =
             (camera.ideal_from_point(point + step) - camera.ideal_from_point(point - step)) / (2 * step_m);
         const double tolerance = 1e-6 * camera.fx_px / point.z();
-        EXPECT_LT((raw.d_px_d_point.col(axis) - raw_slope).norm(), tolerance) << name << ", seed " << seed;
-        EXPECT_LT((ideal.d_px_d_point.col(axis) - ideal_slope).norm(), tolerance) << name << ", seed " << seed;
+        EXPECT_LT((raw.d_px_d_point.col(axis) - raw_slope).norm(), tolerance) << name;
+        EXPECT_LT((ideal.d_px_d_point.col(axis) - ideal_slope).norm(), tolerance) << name;
       }
     }
 }
@@ -115,14 +115,14 @@ TEST(Camera, APointBeyondTheFoldOfABarrelLensHasNoRay) {
 
 TEST(Camera, WhatHasARayHasTheInnermostOne) {
   const Camera camera = camera_with({-0.4, 0, 0, 0, 0});
-  Random random(seed);
+  testing::SeededRandom random(seed);
   int with_ray = 0;
   for (int i = 0; i < 1000; ++i) {
     const Eigen::Vector2d raw_px(random.uniform(-200, 1500), random.uniform(-200, 900));
     const auto ideal_px = camera.ideal_from_raw(raw_px);
     if (!ideal_px) continue;
     ++with_ray;
-    EXPECT_LT(Eigen::Vector2d(camera.ray_from_ideal(*ideal_px).head<2>()).norm(), 0.9129) << "seed " << seed;
+    EXPECT_LT(Eigen::Vector2d(camera.ray_from_ideal(*ideal_px).head<2>()).norm(), 0.9129);
   }
   EXPECT_GT(with_ray, 300);
 }

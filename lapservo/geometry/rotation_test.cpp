@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "lapservo/core/random.h"
+#include "lapservo/testing/seeded_random.h"
 
 namespace lapservo::internal {
 namespace rotation_test {
@@ -16,18 +16,18 @@ Eigen::Vector3d random_direction(Random& random) {
 }
 
 TEST(RotationBetween, TakesOneDirectionToTheOtherTheShortestWay) {
-  Random random(seed);
+  testing::SeededRandom random(seed);
   for (int i = 0; i < 200; ++i) {
     const Eigen::Vector3d from = random_direction(random), to = random_direction(random);
     const Eigen::Quaterniond rotation = rotation_between(2 * from, 0.1 * to);
     EXPECT_NEAR(rotation.norm(), 1, 1e-14);
-    EXPECT_LT((rotation * from - to).norm(), 1e-12) << "seed " << seed;
+    EXPECT_LT((rotation * from - to).norm(), 1e-12);
     EXPECT_NEAR(rotation.angularDistance(Eigen::Quaterniond::Identity()), std::acos(from.dot(to)), 1e-7);
   }
 }
 
 TEST(RotationBetween, OfEqualDirectionsIsNoneAndOfOppositeOnesHalfATurn) {
-  Random random(seed + 1);
+  testing::SeededRandom random(seed + 1);
   for (const double off : {0.0, 1e-15, 1e-9, 1e-7, 1e-6, 1e-4})
     for (int i = 0; i < 20; ++i) {
       const Eigen::Vector3d from = random_direction(random), aside = from.unitOrthogonal();

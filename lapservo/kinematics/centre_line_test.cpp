@@ -13,10 +13,10 @@
 
 #include "lapservo/core/angles.h"
 #include "lapservo/core/csv.h"
-#include "lapservo/core/random.h"
 #include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/testing/sample_frames.h"
+#include "lapservo/testing/seeded_random.h"
 
 namespace lapservo::internal {
 namespace {
@@ -39,10 +39,10 @@ Rigid3 camera_from_unrolled(const Instrument& instrument, const JointVector& q) 
 template <typename Law>
 void for_random_configurations(const Law& law) {
   const Rig rig = example_rig();
-  Random random(seed);
+  testing::SeededRandom random(seed);
   for (int i = 0; i < 300; ++i) {
     const JointVector q = random_configuration(random);
-    SCOPED_TRACE("seed " + std::to_string(seed) + ", configuration " + std::to_string(i));
+    SCOPED_TRACE("configuration " + std::to_string(i));
     const Instrument& instrument = rig.instruments.front();
     const auto line = centre_line(rig.camera, instrument.marker, camera_from_unrolled(instrument, q), q.psi_rad);
     ASSERT_TRUE(line);
@@ -51,12 +51,12 @@ void for_random_configurations(const Law& law) {
 }
 
 TEST(JointVector, TheAxisPointsFromTheRcmToTheMarker) {
-  Random random(seed);
+  testing::SeededRandom random(seed);
   for (int i = 0; i < 100; ++i) {
     const JointVector q = random_configuration(random);
     const Rigid3 pose = rcm_from_unrolled(q);
-    EXPECT_LT((pose * Eigen::Vector3d::Zero() - q.rho_m * shaft_axis_in_rcm(q)).norm(), 1e-12) << "seed " << seed;
-    EXPECT_LT((pose.rotation * Eigen::Vector3d::UnitZ() - shaft_axis_in_rcm(q)).norm(), 1e-12) << "seed " << seed;
+    EXPECT_LT((pose * Eigen::Vector3d::Zero() - q.rho_m * shaft_axis_in_rcm(q)).norm(), 1e-12);
+    EXPECT_LT((pose.rotation * Eigen::Vector3d::UnitZ() - shaft_axis_in_rcm(q)).norm(), 1e-12);
     EXPECT_LT((pose * Eigen::Vector3d(0, 0, -q.rho_m)).norm(), 1e-12) << "the shaft passes through the RCM";
   }
 }
@@ -70,14 +70,14 @@ TEST(JointVector, TheUnrolledFrameIsRzRy) {
 }
 
 TEST(JointVector, AConfigurationIsFoundThroughItsMarkersEnd) {
-  Random random(seed);
+  testing::SeededRandom random(seed);
   const Rigid3 camera_from_rcm = *example_rig().instruments.front().camera_from_rcm;
   for (int i = 0; i < 100; ++i) {
     const JointVector q = random_configuration(random);
     const auto found = configuration_through(camera_from_rcm, (camera_from_rcm * rcm_from_unrolled(q)).translation);
     ASSERT_TRUE(found);
     const JointVector unrolled{q.theta_rad, q.phi_rad, q.rho_m, 0};
-    EXPECT_LT((found->vector() - unrolled.vector()).norm(), 1e-9) << "seed " << seed;
+    EXPECT_LT((found->vector() - unrolled.vector()).norm(), 1e-9);
   }
   EXPECT_FALSE(configuration_through(camera_from_rcm, camera_from_rcm.translation));
 }
@@ -145,7 +145,7 @@ TEST(Features, MeasureAnglesFromTheVerticalAndDistances) {
 
 // To first order: against the spread of the features of sampled points.
 TEST(Features, CovarianceIsThatOfSampledPoints) {
-  Random random(seed);
+  testing::SeededRandom random(seed);
   const std::array<Eigen::Vector2d, 4> edges_px{{{310, 250}, {352, 221}, {399, 187}, {520, 102}}};
   const Eigen::Vector2d rcm_px(-120, 560);
   EdgesCovariance root;

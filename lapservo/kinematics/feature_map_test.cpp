@@ -8,6 +8,7 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/kinematics/centre_line.h"
 #include "lapservo/kinematics/test_models.h"
+#include "lapservo/testing/seeded_random.h"
 
 namespace lapservo::internal {
 namespace {
@@ -50,14 +51,13 @@ void expect_jacobian(const ImageModel& model, const JointVector& q) {
 }
 
 TEST(FeatureMap, JacobianIsTheDerivative) {
-  constexpr std::uint64_t seed = 31;
-  Random random(seed);
+  testing::SeededRandom random(31);
   int checked = 0;
   for (const ImageModel& model : testing::image_models())
     for (int trial = 0; trial < 400; ++trial) {
       const JointVector q = testing::visible_configuration(model, random);
       if (from_seam(feature_map(model, q).point->tau_rad) < 1e-3) continue;
-      SCOPED_TRACE(::testing::Message() << "seed " << seed << ", trial " << trial);
+      SCOPED_TRACE(::testing::Message() << "trial " << trial);
       expect_jacobian(model, q);
       if (HasFailure()) return;
       ++checked;
@@ -66,8 +66,7 @@ TEST(FeatureMap, JacobianIsTheDerivative) {
 }
 
 TEST(FeatureMap, EndsJacobianIsTheDerivativeOfTheEnds) {
-  constexpr std::uint64_t seed = 33;
-  Random random(seed);
+  testing::SeededRandom random(33);
   const auto ends = [](const FeaturePoint& point) {
     return Eigen::Vector4d(point.ideal_px[0].x(), point.ideal_px[0].y(), point.ideal_px[3].x(), point.ideal_px[3].y());
   };
@@ -81,14 +80,13 @@ TEST(FeatureMap, EndsJacobianIsTheDerivativeOfTheEnds) {
         const Eigen::Vector4d numeric = (ends(*ahead.point) - ends(*back.point)) / (2 * h);
         const double scale = here.point->ends_jacobian.col(joint).norm();
         EXPECT_LT((here.point->ends_jacobian.col(joint) - numeric).norm(), 1e-5 * (1 + scale))
-            << "seed " << seed << ", trial " << trial << ", joint " << joint;
+            << "trial " << trial << ", joint " << joint;
       }
     }
 }
 
 TEST(FeatureMap, ValueIsThatOfTheCentreLine) {
-  constexpr std::uint64_t seed = 32;
-  Random random(seed);
+  testing::SeededRandom random(32);
   for (const ImageModel& model : testing::image_models())
     for (int trial = 0; trial < 50; ++trial) {
       const JointVector q = testing::visible_configuration(model, random);
@@ -96,17 +94,16 @@ TEST(FeatureMap, ValueIsThatOfTheCentreLine) {
           centre_line(model.camera, model.marker, model.camera_from_rcm * rcm_from_unrolled(q), q.psi_rad);
       const Features expected = features_of(line->ideal_px, projected_rcm_px(model.camera, model.camera_from_rcm));
       const Eigen::Vector4d f = feature_map(model, q).point->f;
-      EXPECT_DOUBLE_EQ(f[0], expected.s_rad) << "seed " << seed;
-      EXPECT_DOUBLE_EQ(f[1], *expected.r_px) << "seed " << seed;
-      EXPECT_DOUBLE_EQ(f[2], expected.l_px) << "seed " << seed;
-      EXPECT_DOUBLE_EQ(f[3], expected.d_px) << "seed " << seed;
+      EXPECT_DOUBLE_EQ(f[0], expected.s_rad);
+      EXPECT_DOUBLE_EQ(f[1], *expected.r_px);
+      EXPECT_DOUBLE_EQ(f[2], expected.l_px);
+      EXPECT_DOUBLE_EQ(f[3], expected.d_px);
     }
 }
 
 // At the seam only d jumps, by the step of the print there; on both sides the Jacobian is that side's derivative.
 TEST(FeatureMap, JumpsInDAtTheSeamAndNowhereElse) {
-  constexpr std::uint64_t seed = 34;
-  Random random(seed);
+  testing::SeededRandom random(34);
   for (const ImageModel& model : testing::image_models())
     for (int trial = 0; trial < 30; ++trial) {
       JointVector q = testing::visible_configuration(model, random);
@@ -120,9 +117,9 @@ TEST(FeatureMap, JumpsInDAtTheSeamAndNowhereElse) {
       expect_jacobian(model, q);
       EXPECT_NEAR(upper.tau_rad, beside, 1e-9);
       EXPECT_NEAR(lower.tau_rad, two_pi - beside, 1e-9);
-      EXPECT_LT((upper.f - lower.f).head<3>().norm(), 1e-9) << "seed " << seed;
+      EXPECT_LT((upper.f - lower.f).head<3>().norm(), 1e-9);
       const double jump_m = model.marker.bands_upper_m[2] - model.marker.bands_lower_m[2];
-      EXPECT_GT((lower.f[3] - upper.f[3]) * jump_m, 0) << "seed " << seed;
+      EXPECT_GT((lower.f[3] - upper.f[3]) * jump_m, 0);
       EXPECT_LT((upper.jacobian - lower.jacobian).topRows<3>().norm(), 1e-6 * upper.jacobian.norm());
       if (HasFailure()) return;
     }

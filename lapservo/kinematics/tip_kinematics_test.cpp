@@ -7,9 +7,9 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/core/angles.h"
-#include "lapservo/core/random.h"
 #include "lapservo/geometry/rotation.h"
 #include "lapservo/kinematics/test_models.h"
+#include "lapservo/testing/seeded_random.h"
 
 namespace lapservo::internal {
 namespace {
@@ -24,12 +24,12 @@ Rigid3 random_tip(Random& random) {
 
 template <typename Law>
 void for_random_tips(std::uint64_t seed, const Law& law) {
-  Random random(seed);
+  testing::SeededRandom random(seed);
   for (const ImageModel& model : testing::image_models())
     for (int trial = 0; trial < 100; ++trial) {
       const JointVector q = testing::visible_configuration(model, random);
       if (std::sin(q.phi_rad) < 0.3) continue;
-      SCOPED_TRACE("seed " + std::to_string(seed) + ", trial " + std::to_string(trial));
+      SCOPED_TRACE("trial " + std::to_string(trial));
       const Rigid3 marker_from_tip = random_tip(random);
       law(model, q, marker_from_tip, camera_from_marker(model.marker, model.camera_from_rcm, q) * marker_from_tip);
     }

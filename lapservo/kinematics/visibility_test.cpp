@@ -6,11 +6,11 @@
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
-#include "lapservo/core/random.h"
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/geometry/rotation.h"
 #include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/kinematics/test_models.h"
+#include "lapservo/testing/seeded_random.h"
 
 namespace lapservo::internal {
 namespace {
@@ -41,14 +41,13 @@ bool every_seen_point_in_image(const Camera& camera, const Marker& marker, const
 }
 
 TEST(Visibility, IsThatOfEveryPointOfTheSideThatFacesTheCamera) {
-  constexpr std::uint64_t seed = 61;
   constexpr double border_px = 25, between_points_px = 10, steepest_rad = 0.6;
-  Random random(seed);
+  testing::SeededRandom random(61);
   int in_view = 0, out_of_view = 0;
   for (const ImageModel& model : testing::image_models())
     for (int trial = 0; trial < 400; ++trial) {
       const Rigid3 pose = model.camera_from_rcm * rcm_from_unrolled(testing::visible_configuration(model, random));
-      SCOPED_TRACE("seed " + std::to_string(seed) + ", trial " + std::to_string(trial));
+      SCOPED_TRACE("trial " + std::to_string(trial));
       if (marker_in_view(model.camera, model.marker, pose, {steepest_rad, border_px})) {
         ++in_view;
         EXPECT_TRUE(every_seen_point_in_image(model.camera, model.marker, pose, border_px - between_points_px));
@@ -63,8 +62,7 @@ TEST(Visibility, IsThatOfEveryPointOfTheSideThatFacesTheCamera) {
 }
 
 TEST(Visibility, EndsWhereTheShaftLeansTooSteeply) {
-  constexpr std::uint64_t seed = 62;
-  Random random(seed);
+  testing::SeededRandom random(62);
   const ImageModel model = testing::image_models().front();
   for (int trial = 0; trial < 200; ++trial) {
     const double steepest_rad = random.uniform(0.1, 1), turn_rad = random.uniform(-pi, pi);
@@ -73,7 +71,7 @@ TEST(Visibility, EndsWhereTheShaftLeansTooSteeply) {
       for (const double fraction : {0.99, 1.01}) {
         const Rigid3 pose = leaning_shaft(model.marker, middle_m, side * fraction * steepest_rad, turn_rad);
         EXPECT_EQ(marker_in_view(model.camera, model.marker, pose, {steepest_rad, 10}), fraction < 1)
-            << "seed " << seed << ", trial " << trial;
+            << "trial " << trial;
       }
   }
 }

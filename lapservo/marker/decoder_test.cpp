@@ -15,9 +15,9 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/core/angles.h"
-#include "lapservo/core/random.h"
 #include "lapservo/marker/marker.h"
 #include "lapservo/testing/markers.h"
+#include "lapservo/testing/seeded_random.h"
 
 namespace lapservo::internal {
 namespace {
@@ -41,7 +41,7 @@ double tau_of(int i) {
 }
 
 TEST(Marker, BoundariesAreStraightFromEdgeToEdgeOfThePrint) {
-  Random random(seed);
+  testing::SeededRandom random(seed);
   for (int i = 0; i < 200; ++i) {
     const Marker square = random_linear_marker(random), marker = i % 2 ? askew(square, random) : square;
     ASSERT_FALSE(marker_problem(marker));
@@ -81,7 +81,7 @@ TEST(Marker, TheGapIsBare) {
 }
 
 TEST(CrossRatioDecoder, InvertsAskewPrints) {
-  Random random(seed);
+  testing::SeededRandom random(seed);
   int decodable = 0;
   for (int i = 0; i < 2000; ++i) {
     const Marker marker = askew(random_marker(random), random);
@@ -99,7 +99,7 @@ TEST(CrossRatioDecoder, InvertsAskewPrints) {
 }
 
 TEST(Marker, CrossRatioIsTheSameInEveryPerspectiveImage) {
-  Random random(seed);
+  testing::SeededRandom random(seed);
   int checked = 0;
   for (int i = 0; i < 1000; ++i) {
     const double l1 = random.uniform(0.1, 1), l2 = random.uniform(0.1, 1), l3 = random.uniform(0.1, 1);
@@ -108,8 +108,7 @@ TEST(Marker, CrossRatioIsTheSameInEveryPerspectiveImage) {
     if (std::abs(a - b * c) < 0.1) continue;  // the line is seen end on
     const std::array<double, 4> e{image(0), image(l1), image(l1 + l2), image(l1 + l2 + l3)};
     EXPECT_NEAR(cross_ratio(std::abs(e[1] - e[0]), std::abs(e[2] - e[1]), std::abs(e[3] - e[2])),
-                cross_ratio(l1, l2, l3), 1e-9)
-        << "seed " << seed;
+                cross_ratio(l1, l2, l3), 1e-9);
     ++checked;
   }
   EXPECT_GT(checked, 800);
@@ -128,27 +127,27 @@ std::vector<double> turn_from_seam_to_seam() {
 }
 
 TEST(CrossRatioDecoder, IsExactForTheLinearFamily) {
-  Random random(seed);
+  testing::SeededRandom random(seed);
   for (int i = 0; i < 50; ++i) {
     const Marker marker = random_linear_marker(random);
     const CrossRatioDecoder decoder(marker);
     const double at_upper = cross_ratio_at(marker, 0), rise = cross_ratio_at(marker, two_pi - 1e-9) - at_upper;
     for (const double tau_rad : turn_from_seam_to_seam()) {
-      ASSERT_NEAR(round_trip_rad(marker, tau_rad), tau_rad, 1e-10) << "seed " << seed << ", design " << i;
-      ASSERT_NEAR(decoder.tau_rad(at_upper + rise * tau_rad / two_pi), tau_rad, 1e-8) << "eq. (18), seed " << seed;
+      ASSERT_NEAR(round_trip_rad(marker, tau_rad), tau_rad, 1e-10) << "design " << i;
+      ASSERT_NEAR(decoder.tau_rad(at_upper + rise * tau_rad / two_pi), tau_rad, 1e-8) << "eq. (18)";
     }
   }
 }
 
 TEST(CrossRatioDecoder, InvertsEveryOtherDecodableDesign) {
-  Random random(seed);
+  testing::SeededRandom random(seed);
   int designs = 0;
   for (int i = 0; i < 300; ++i) {
     const Marker marker = random_marker(random);
     if (!decoding_problem(marker).empty()) continue;
     ++designs;
     for (const double tau_rad : turn_from_seam_to_seam())
-      ASSERT_NEAR(round_trip_rad(marker, tau_rad), tau_rad, 1e-7) << "seed " << seed << ", design " << i;
+      ASSERT_NEAR(round_trip_rad(marker, tau_rad), tau_rad, 1e-7) << "design " << i;
   }
   EXPECT_GT(designs, 50) << "too few decodable designs were drawn for the test to mean something";
 }
@@ -185,10 +184,10 @@ TEST(CrossRatioDecoder, BeyondTheRangeGivesTheNearerEnd) {
 
 TEST(DecodingProblem, IsWhereTheCrossRatioTurnsBackAndNowhereElse) {
   const std::string says = "the cross-ratio turns back near tau = ";
-  Random random(seed);
+  testing::SeededRandom random(seed);
   int ends_higher = 0, ends_lower = 0;
   for (int i = 0; i < 300; ++i) {
-    SCOPED_TRACE("seed " + std::to_string(seed) + ", design " + std::to_string(i));
+    SCOPED_TRACE("design " + std::to_string(i));
     const Marker marker = random_marker(random);
     const std::string problem = decoding_problem(marker);
     const auto turn_rad = first_turn_rad(marker);
@@ -266,7 +265,7 @@ TEST(ColourOrder, IsTheSameReversedOrAnother) {
 
 // Eq. (16) on the marker's own lengths, for any marker and each band that changes.
 TEST(TauByLength, InvertsEveryBandThatChanges) {
-  Random random(seed);
+  testing::SeededRandom random(seed);
   int bands = 0;
   for (int i = 0; i < 100; ++i) {
     const Marker marker = random_marker(random);
@@ -276,7 +275,7 @@ TEST(TauByLength, InvertsEveryBandThatChanges) {
       for (int k = 0; k < 50; ++k) {
         const double tau_rad = random.uniform(0, two_pi);
         const auto e = boundaries_m(marker, tau_rad);
-        ASSERT_NEAR(tau_by_length_rad(marker, band, e[band + 1] - e[band]), tau_rad, 1e-6) << "seed " << seed;
+        ASSERT_NEAR(tau_by_length_rad(marker, band, e[band + 1] - e[band]), tau_rad, 1e-6);
       }
     }
   }

@@ -5,15 +5,14 @@
 #include <cmath>
 #include <cstdint>
 #include <string>
-#include <vector>
 
 #include <gtest/gtest.h>
 
 #include "lapservo/core/angles.h"
-#include "lapservo/core/random.h"
 #include "lapservo/marker/decoder.h"
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/markers.h"
+#include "lapservo/testing/seeded_random.h"
 
 namespace lapservo::internal {
 namespace design_test {
@@ -41,7 +40,7 @@ Marker random_member(double length_m, double min_m, Random& random) {
 }
 
 TEST(DesignMarker, KeepsToWhatWasAskedForAndCanBeDecodedByEquation18) {
-  Random random(seed);
+  testing::SeededRandom random(seed);
   for (int i = 0; i < 12; ++i) {
     DesignSpec spec;
     spec.diameter_m = random.uniform(0.004, 0.015);
@@ -49,7 +48,7 @@ TEST(DesignMarker, KeepsToWhatWasAskedForAndCanBeDecodedByEquation18) {
     spec.length_m = *spec.min_band_m * 3 + random.uniform(0.0005, 0.02);
     spec.hues_deg = {20, 140, 260};
     const Marker marker = design_marker(spec);
-    SCOPED_TRACE("seed " + std::to_string(seed) + ", design " + std::to_string(i));
+    SCOPED_TRACE("design " + std::to_string(i));
     EXPECT_FALSE(marker_problem(marker));
     EXPECT_EQ(decoding_problem(marker), "");
     EXPECT_TRUE(in_linear_family(marker));
@@ -63,15 +62,14 @@ TEST(DesignMarker, KeepsToWhatWasAskedForAndCanBeDecodedByEquation18) {
 }
 
 TEST(DesignMarker, NoOtherMemberOfTheFamilyIsClearlyBetter) {
-  Random random(seed);
+  testing::SeededRandom random(seed);
   for (const Viewing& viewing : {Viewing{}, Viewing{700, 0.15, 0.2}}) {
     DesignSpec spec;
     spec.viewing = viewing;
     const Marker marker = design_marker(spec);
     const double best = worst_sigma_centre_line_rad(marker, viewing);
     for (int i = 0; i < 3000; ++i)
-      EXPECT_GT(worst_sigma_centre_line_rad(random_member(marker.length_m(), 0.003, random), viewing), 0.99 * best)
-          << "seed " << seed;
+      EXPECT_GT(worst_sigma_centre_line_rad(random_member(marker.length_m(), 0.003, random), viewing), 0.99 * best);
     EXPECT_LT(best,
               worst_sigma_centre_line_rad(marker_with({0.0035, 0.0035, 0.017}, {0.0095, 0.0095, 0.005}), viewing));
   }
@@ -93,23 +91,23 @@ TEST(DesignMarker, RefusesALengthIntoWhichNoBandsFit) {
 }
 
 TEST(WorstSigma, IsTheLargestOverTheTurn) {
-  Random random(seed);
+  testing::SeededRandom random(seed);
   for (int i = 0; i < 20; ++i) {
     const Marker marker = testing::random_linear_marker(random);
     double largest = 0;
     for (int k = 0; k < 2000; ++k)
       largest = std::max(largest, predicted_sigma_centre_line_rad(marker, two_pi * (k + 0.5) / 2000, {}));
-    EXPECT_NEAR(worst_sigma_centre_line_rad(marker, {}) / largest, 1, 0.01) << "seed " << seed << ", design " << i;
+    EXPECT_NEAR(worst_sigma_centre_line_rad(marker, {}) / largest, 1, 0.01) << "design " << i;
   }
 }
 
 TEST(InLinearFamily, MeansThatTheCrossRatioRunsStraight) {
-  Random random(seed);
+  testing::SeededRandom random(seed);
   for (int i = 0; i < 200; ++i) {
-    EXPECT_TRUE(in_linear_family(testing::random_linear_marker(random))) << "seed " << seed;
+    EXPECT_TRUE(in_linear_family(testing::random_linear_marker(random)));
     const Marker any = testing::random_marker(random);
     const double middle = (cross_ratio_at(any, 0) + cross_ratio_at(any, two_pi - 1e-9)) / 2;
-    EXPECT_EQ(in_linear_family(any), std::abs(cross_ratio_at(any, pi) - middle) < 1e-5) << "seed " << seed;
+    EXPECT_EQ(in_linear_family(any), std::abs(cross_ratio_at(any, pi) - middle) < 1e-5);
   }
 }
 

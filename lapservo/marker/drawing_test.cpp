@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <iterator>
@@ -22,9 +21,9 @@
 
 #include "lapservo/core/angles.h"
 #include "lapservo/core/csv.h"
-#include "lapservo/core/random.h"
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/markers.h"
+#include "lapservo/testing/seeded_random.h"
 #include "lapservo/testing/temporary_folder.h"
 
 // Fontconfig, which cairo draws text with, keeps its caches until the end: no leak of ours.
@@ -202,10 +201,8 @@ void for_sheets(const Marker& marker, Paper paper, int copies, const std::functi
 
 TEST(PrintSheet, WrappedAroundTheShaftGivesTheBoundariesThatTheMarkerPredicts) {
   for_sheets(example, Paper::a4, 1, [](const Page& page) { expect_wraps_into(page, example, 1); });
-  constexpr std::uint64_t seed = 53;
-  Random random(seed);
+  testing::SeededRandom random(53);
   for (int i = 0; i < 5; ++i) {
-    SCOPED_TRACE("seed " + std::to_string(seed));
     Marker marker = testing::random_marker(random);
     marker.diameter_m = random.uniform(0.004, 0.02);
     marker.hues_deg = {30, 150, 270};

@@ -1,7 +1,6 @@
 #include "lapservo/marker/sensitivity.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -10,10 +9,10 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/core/angles.h"
-#include "lapservo/core/random.h"
 #include "lapservo/marker/decoder.h"
 #include "lapservo/marker/marker.h"
 #include "lapservo/testing/markers.h"
+#include "lapservo/testing/seeded_random.h"
 
 namespace lapservo::internal {
 namespace sensitivity_test {
@@ -49,14 +48,14 @@ double decoded_sigma_rad(const Marker& marker, double tau_rad, const Viewing& vi
 }
 
 TEST(PredictedSigma, OfTheCentreLineIsTheSpreadOfWhatIsDecoded) {
-  Random random(seed);
+  testing::SeededRandom random(seed);
   const Viewing viewing{1100, 0.11, 0.05};
   for (const Marker& marker : {linear, non_linear})
     for (const double tau_rad : {0.5, 1.7, 3.1, 4.4, 5.8})
       EXPECT_NEAR(decoded_sigma_rad(marker, tau_rad, viewing, random) /
                       predicted_sigma_centre_line_rad(marker, tau_rad, viewing),
                   1, 0.03)
-          << "tau " << tau_rad << ", seed " << seed;
+          << "tau " << tau_rad;
 }
 
 // tau and a shift along the axis, fitted by least squares to all boundaries seen on lines one pixel apart, from the
@@ -101,7 +100,7 @@ class SurfaceFit {
 };
 
 TEST(PredictedSigma, OfTheSurfaceIsTheSpreadOfItsLeastSquaresFit) {
-  Random random(seed);
+  testing::SeededRandom random(seed);
   const Viewing viewing{1100, 0.11, 0.1};
   for (const Marker& marker : {linear, non_linear})
     for (const double tau_rad : {0.0, 0.4, 3.0, 5.9}) {
@@ -110,7 +109,7 @@ TEST(PredictedSigma, OfTheSurfaceIsTheSpreadOfItsLeastSquaresFit) {
       double sum = 0;
       for (int i = 0; i < draws; ++i) sum += std::pow(fit.error_rad(random), 2);
       EXPECT_NEAR(std::sqrt(sum / draws) / predicted_sigma_surface_rad(marker, tau_rad, viewing), 1, 0.04)
-          << "tau " << tau_rad << ", seed " << seed;
+          << "tau " << tau_rad;
     }
 }
 

@@ -10,14 +10,13 @@ namespace lapservo::internal {
 namespace {
 
 TEST(LineObservation, LinesThroughAPointMeetThere) {
-  constexpr std::uint64_t seed = 61;
-  Random random(seed);
+  testing::SeededRandom random(61);
   for (int trial = 0; trial < 200; ++trial) {
     const Eigen::Vector2d point(random.uniform(-2000, 2000), random.uniform(-2000, 2000));
     const auto lines = testing::fan_of_lines(point, 2, 1, random);
     const auto met = intersection_px(lines[0], lines[1]);
-    ASSERT_TRUE(met) << "seed " << seed;
-    EXPECT_LT((*met - point).norm(), 1e-4) << "seed " << seed;
+    ASSERT_TRUE(met);
+    EXPECT_LT((*met - point).norm(), 1e-4);
   }
 }
 

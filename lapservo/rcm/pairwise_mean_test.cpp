@@ -8,13 +8,12 @@ namespace lapservo::internal {
 namespace {
 
 TEST(PairwiseMean, IsExactWithoutNoise) {
-  constexpr std::uint64_t seed = 63;
-  Random random(seed);
+  testing::SeededRandom random(63);
   for (std::size_t count = 2; count < 30; ++count) {
     const Eigen::Vector2d point(random.uniform(-2000, 2000), random.uniform(-2000, 2000));
     const auto mean = mean_of_intersections(testing::fan_of_lines(point, count, 1.5, random));
     ASSERT_TRUE(mean);
-    EXPECT_LT((mean->point_px - point).norm(), 1e-4) << "seed " << seed;
+    EXPECT_LT((mean->point_px - point).norm(), 1e-4);
     EXPECT_EQ(mean->pairs, count * (count - 1) / 2);
     EXPECT_EQ(mean->covariance_px2.has_value(), count > 2);
   }
@@ -28,8 +27,7 @@ TEST(PairwiseMean, WeighsEveryPairTheSame) {
 
 // Well spread lines, where the mean of the intersections has a variance.
 TEST(PairwiseMean, JackknifeIsAboutRight) {
-  constexpr std::uint64_t seed = 64;
-  Random random(seed);
+  testing::SeededRandom random(64);
   const Eigen::Vector2d point(-300, -250);
   double squares = 0, expected = 0;
   constexpr int trials = 300;
@@ -44,8 +42,8 @@ TEST(PairwiseMean, JackknifeIsAboutRight) {
     squares += (mean->point_px - point).squaredNorm();
     expected += mean->covariance_px2->trace();
   }
-  EXPECT_GT(squares / expected, 0.5) << "seed " << seed;
-  EXPECT_LT(squares / expected, 1.5) << "seed " << seed;
+  EXPECT_GT(squares / expected, 0.5);
+  EXPECT_LT(squares / expected, 1.5);
 }
 
 TEST(PairwiseMean, NeedsTwoLinesThatMeet) {

@@ -37,12 +37,15 @@ Lines with_errors(Lines lines, double factor, Random& random) {
   return lines;
 }
 
+Eigen::Vector2d normal_of(const LineObservation& line) {
+  return (line.to_px - line.from_px).normalized().unitOrthogonal();
+}
+
 // Moved across itself by 50 to 200 standard deviations.
 void spoil(LineObservation& line, Random& random) {
-  const Eigen::Vector2d along = (line.to_px - line.from_px).normalized();
   const double side = random.uniform() < 0.5 ? -1 : 1;
   const Eigen::Vector2d aside =
-      side * random.uniform(50, 200) * std::sqrt(line.covariance_px2.trace()) * Eigen::Vector2d(-along.y(), along.x());
+      side * random.uniform(50, 200) * std::sqrt(line.covariance_px2.trace()) * normal_of(line);
   line.from_px += aside, line.to_px += aside;
 }
 
@@ -52,14 +55,13 @@ double mahalanobis2(const RcmEstimate& estimate, const Eigen::Vector2d& truth) {
 }
 
 TEST(ProjectedRcm, IsExactWithoutNoise) {
-  constexpr std::uint64_t seed = 71;
-  Random random(seed);
+  testing::SeededRandom random(71);
   for (std::size_t count = 2; count < 40; ++count) {
     const Eigen::Vector2d point(random.uniform(-2000, 2000), random.uniform(-2000, 2000));
     for (const NoiseScale scale : {NoiseScale::known, NoiseScale::estimated}) {
       const auto estimate = estimate_projected_rcm(uneven_lines(point, count, random), {scale});
-      ASSERT_EQ(estimate.status, RcmStatus::ok) << "seed " << seed << ", " << count << " lines";
-      EXPECT_LT((estimate.point_px - point).norm(), 1e-4) << "seed " << seed;
+      ASSERT_EQ(estimate.status, RcmStatus::ok) << count << " lines";
+      EXPECT_LT((estimate.point_px - point).norm(), 1e-4);
       EXPECT_LT(estimate.chi2, 1e-8);
       EXPECT_EQ(estimate.degrees_of_freedom, static_cast<int>(count) - 2);
       EXPECT_EQ(estimate.outliers, 0u);
@@ -70,8 +72,7 @@ TEST(ProjectedRcm, IsExactWithoutNoise) {
 
 // The image rotated, scaled and moved: the estimate and its covariance follow.
 TEST(ProjectedRcm, FollowsASimilarity) {
-  constexpr std::uint64_t seed = 72;
-  Random random(seed);
+  testing::SeededRandom random(72);
   for (int trial = 0; trial < 30; ++trial) {
     const Lines lines = with_errors(uneven_lines({-300, 200}, 15, random), 1, random);
     const Eigen::Matrix2d a = random.uniform(0.2, 4) * Eigen::Rotation2Dd(random.uniform(-pi, pi)).toRotationMatrix();
@@ -83,7 +84,7 @@ TEST(ProjectedRcm, FollowsASimilarity) {
       line = {a * line.from_px + b, a * line.to_px + b, both * line.covariance_px2 * both.transpose()};
     const auto here = estimate_projected_rcm(lines, {NoiseScale::known}),
                there = estimate_projected_rcm(moved, {NoiseScale::known});
-    EXPECT_LT((there.point_px - (a * here.point_px + b)).norm(), 1e-5) << "seed " << seed;
+    EXPECT_LT((there.point_px - (a * here.point_px + b)).norm(), 1e-5);
     EXPECT_LT((*there.covariance_px2 - a * *here.covariance_px2 * a.transpose()).norm(),
               1e-5 * there.covariance_px2->norm());
     EXPECT_NEAR(there.chi2, here.chi2, 1e-6 * here.chi2);
@@ -92,8 +93,7 @@ TEST(ProjectedRcm, FollowsASimilarity) {
 }
 
 TEST(ProjectedRcm, DoesNotCareWhichEndComesFirstNorForTheOrder) {
-  constexpr std::uint64_t seed = 73;
-  Random random(seed);
+  testing::SeededRandom random(73);
   const Lines lines = with_errors(uneven_lines({-300, 200}, 15, random), 1, random);
   Eigen::Matrix4d swap = Eigen::Matrix4d::Zero();
   swap.topRightCorner<2, 2>() = swap.bottomLeftCorner<2, 2>() = Eigen::Matrix2d::Identity();
@@ -108,8 +108,7 @@ TEST(ProjectedRcm, DoesNotCareWhichEndComesFirstNorForTheOrder) {
 }
 
 TEST(ProjectedRcm, AWorthlessLineIsAsGoodAsNone) {
-  constexpr std::uint64_t seed = 74;
-  Random random(seed);
+  testing::SeededRandom random(74);
   Lines lines = with_errors(uneven_lines({-300, 200}, 12, random), 1, random);
   const auto without = estimate_projected_rcm(lines, {NoiseScale::known});
   lines.push_back(line_between({0, 0}, {500, -100}, 1e5));
@@ -120,8 +119,7 @@ TEST(ProjectedRcm, AWorthlessLineIsAsGoodAsNone) {
 
 // Errors over sigma of unit spread, no bias, and chi2 as it should be.
 TEST(ProjectedRcm, CovarianceIsHonest) {
-  constexpr std::uint64_t seed = 75;
-  Random random(seed);
+  testing::SeededRandom random(75);
   const Eigen::Vector2d truth(-120, -240);
   constexpr int trials = 1500;
   for (const double noise_factor : {1.0, 3.0}) {
@@ -131,30 +129,29 @@ TEST(ProjectedRcm, CovarianceIsHonest) {
     for (int trial = 0; trial < trials; ++trial) {
       const auto estimate =
           estimate_projected_rcm(with_errors(uneven_lines(truth, 20, random), noise_factor, random), {scale});
-      ASSERT_EQ(estimate.status, RcmStatus::ok) << "seed " << seed;
+      ASSERT_EQ(estimate.status, RcmStatus::ok);
       spread += mahalanobis2(estimate, truth) / 2 / trials;
       const Eigen::Matrix2d root = estimate.covariance_px2->llt().matrixL();
       bias_sigmas += root.inverse() * (estimate.point_px - truth) / trials;
       chi2_fraction += estimate.chi2 / estimate.degrees_of_freedom / trials;
       factor += estimate.noise_factor / trials;
     }
-    EXPECT_NEAR(std::sqrt(spread), scale == NoiseScale::known ? 1 : 1.06, 0.06) << "seed " << seed;  // Student's t
-    EXPECT_LT(bias_sigmas.norm(), 0.1) << "seed " << seed;
-    EXPECT_NEAR(std::sqrt(chi2_fraction), noise_factor, 0.05 * noise_factor) << "seed " << seed;
-    EXPECT_NEAR(factor, scale == NoiseScale::known ? 1 : noise_factor, 0.05 * noise_factor) << "seed " << seed;
+    EXPECT_NEAR(std::sqrt(spread), scale == NoiseScale::known ? 1 : 1.06, 0.06);  // Student's t
+    EXPECT_LT(bias_sigmas.norm(), 0.1);
+    EXPECT_NEAR(std::sqrt(chi2_fraction), noise_factor, 0.05 * noise_factor);
+    EXPECT_NEAR(factor, scale == NoiseScale::known ? 1 : noise_factor, 0.05 * noise_factor);
   }
 }
 
 // By finite differences: an error that all lines share moves the estimate as far as the covariance says.
 TEST(ProjectedRcm, CovarianceCoversWhatTheLinesShare) {
-  constexpr std::uint64_t seed = 80;
-  Random random(seed);
+  testing::SeededRandom random(80);
   for (int trial = 0; trial < 20; ++trial) {
     const Lines lines = uneven_lines({-120, -240}, 20, random);
     const auto moved_by = [&](double from_px, double to_px) {
       Lines moved = lines;
       for (LineObservation& line : moved) {
-        const Eigen::Vector2d along = (line.to_px - line.from_px).normalized(), across(-along.y(), along.x());
+        const Eigen::Vector2d across = normal_of(line);
         line.from_px += from_px * across, line.to_px += to_px * across;
       }
       return estimate_projected_rcm(moved, {NoiseScale::known}).point_px;
@@ -166,14 +163,13 @@ TEST(ProjectedRcm, CovarianceCoversWhatTheLinesShare) {
         common_px * common_px * (by_from * by_from.transpose() + by_to * by_to.transpose());
     const Eigen::Matrix2d added = *estimate_projected_rcm(lines, {NoiseScale::known, common_px}).covariance_px2 -
                                   *estimate_projected_rcm(lines, {NoiseScale::known}).covariance_px2;
-    EXPECT_LT((added - expected).norm(), 1e-3 * expected.norm()) << "seed " << seed << ", trial " << trial;
+    EXPECT_LT((added - expected).norm(), 1e-3 * expected.norm()) << "trial " << trial;
   }
 }
 
 // A fan so narrow, and noise so large, that lines weighted where they seem to be pull the estimate towards themselves.
 TEST(ProjectedRcm, IsUnbiasedInANarrowFan) {
-  constexpr std::uint64_t seed = 76;
-  Random random(seed);
+  testing::SeededRandom random(76);
   const Eigen::Vector2d truth(-120, -240), along(std::cos(0.3), std::sin(0.3));
   constexpr int trials = 600;
   double bias_px = 0, sigma_px = 0, spread = 0, mean_bias_px = 0;
@@ -182,21 +178,20 @@ TEST(ProjectedRcm, IsUnbiasedInANarrowFan) {
     for (LineObservation& line : lines) line.covariance_px2 *= 25;
     lines = with_errors(lines, 1, random);
     const auto estimate = estimate_projected_rcm(lines, {NoiseScale::known});
-    ASSERT_EQ(estimate.status, RcmStatus::ok) << "seed " << seed;
+    ASSERT_EQ(estimate.status, RcmStatus::ok);
     EXPECT_TRUE(estimate.near_parallel);
     bias_px += (estimate.point_px - truth).dot(along) / trials;
     sigma_px += std::sqrt(along.dot(*estimate.covariance_px2 * along)) / trials;
     spread += mahalanobis2(estimate, truth) / 2 / trials;
     mean_bias_px += (mean_of_intersections(lines)->point_px - truth).dot(along) / trials;
   }
-  EXPECT_LT(std::abs(bias_px), 0.2 * sigma_px) << "seed " << seed;
-  EXPECT_GT(std::abs(mean_bias_px), 5 * std::abs(bias_px)) << "seed " << seed;
-  EXPECT_NEAR(std::sqrt(spread), 1, 0.1) << "seed " << seed;
+  EXPECT_LT(std::abs(bias_px), 0.2 * sigma_px);
+  EXPECT_GT(std::abs(mean_bias_px), 5 * std::abs(bias_px));
+  EXPECT_NEAR(std::sqrt(spread), 1, 0.1);
 }
 
 TEST(ProjectedRcm, LeavesOutOutliersAndNamesThem) {
-  constexpr std::uint64_t seed = 77;
-  Random random(seed);
+  testing::SeededRandom random(77);
   const Eigen::Vector2d truth(-120, -240);
   constexpr int trials = 300, spoiled = 5;
   double spread = 0;
@@ -205,25 +200,24 @@ TEST(ProjectedRcm, LeavesOutOutliersAndNamesThem) {
     for (std::size_t i = 0; i < spoiled; ++i) spoil(lines[3 * i], random);
     const auto estimate = estimate_projected_rcm(lines, {trial % 2 ? NoiseScale::known : NoiseScale::estimated});
     ASSERT_EQ(estimate.status, RcmStatus::ok);
-    for (std::size_t i = 0; i < spoiled; ++i) EXPECT_FALSE(estimate.used[3 * i]) << "seed " << seed << ", " << trial;
-    EXPECT_LE(estimate.outliers, spoiled + 4u) << "seed " << seed << ", " << trial;
+    for (std::size_t i = 0; i < spoiled; ++i) EXPECT_FALSE(estimate.used[3 * i]) << trial;
+    EXPECT_LE(estimate.outliers, spoiled + 4u) << trial;
     spread += mahalanobis2(estimate, truth) / 2 / trials;
   }
-  EXPECT_NEAR(std::sqrt(spread), 1.06, 0.14) << "seed " << seed;
+  EXPECT_NEAR(std::sqrt(spread), 1.06, 0.14);
 }
 
 TEST(ProjectedRcm, WarnsOfNearlyParallelLines) {
-  constexpr std::uint64_t seed = 79;
-  Random random(seed);
+  testing::SeededRandom random(79);
   const Eigen::Vector2d truth(-120, -240);
   const auto of_fan = [&](double fan, double factor) {
     return estimate_projected_rcm(with_errors(testing::fan_of_lines(truth, 20, fan, random), factor, random),
                                   {NoiseScale::estimated});
   };
   for (int trial = 0; trial < 20; ++trial) {
-    EXPECT_FALSE(of_fan(0.9, 1).near_parallel) << "seed " << seed;
-    EXPECT_TRUE(of_fan(0.05, 0.01).near_parallel) << "seed " << seed;  // by their directions
-    EXPECT_TRUE(of_fan(0.3, 60).near_parallel) << "seed " << seed;     // by what the noise makes of them
+    EXPECT_FALSE(of_fan(0.9, 1).near_parallel);
+    EXPECT_TRUE(of_fan(0.05, 0.01).near_parallel);  // by their directions
+    EXPECT_TRUE(of_fan(0.3, 60).near_parallel);     // by what the noise makes of them
   }
 }
 
@@ -231,32 +225,31 @@ TEST(ProjectedRcm, WarnsOfNearlyParallelLines) {
 const Eigen::Vector2d moves(0.6, 0.8);  // the RCM, from the first line to the last
 struct Departure {
   std::string name, cause;
-  std::function<void(LineObservation&, double part, const Eigen::Vector2d& normal, double px)> apply;
+  std::function<void(LineObservation&, double part, double px)> apply;
 };
 
 std::vector<Departure> departures() {
   const Eigen::Vector2d middle(560, -10);
   return {{"the RCM moves", "the RCM moves by",
-           [](LineObservation& line, double part, const Eigen::Vector2d&, double px) {
+           [](LineObservation& line, double part, double px) {
              const Eigen::Vector2d off = (part - 0.5) * px * moves;
              line.from_px += off, line.to_px += off;
            }},
           {"a lens", "bend as by a lens",
-           [=](LineObservation& line, double, const Eigen::Vector2d&, double px) {
+           [=](LineObservation& line, double, double px) {
              for (Eigen::Vector2d* end : {&line.from_px, &line.to_px})
                *end += px * ((*end - middle) / 500).squaredNorm() * (*end - middle) / 500;
            }},
           {"one end beside the axis", "on one side",
-           [](LineObservation& line, double, const Eigen::Vector2d& normal, double px) { line.to_px += px * normal; }},
+           [](LineObservation& line, double, double px) { line.to_px -= px * normal_of(line); }},
           {"noise beyond the sigmas", "their own sigmas", {}}};
 }
 
 // Refuses nothing: sigmas hold for what is said, and for what is too small to be seen.
 TEST(ProjectedRcm, NamesWhatNoPointExplainsAndItsSigmaHolds) {
-  constexpr std::uint64_t seed = 91;
   constexpr int trials = 100;
   const Eigen::Vector2d truth(-120, -240);
-  Random random(seed);
+  testing::SeededRandom random(91);
   const auto tell = [&](const Departure* departure, double px, NoiseScale scale) {
     int told = 0, named = 0, wrong = 0;
     double squares = 0;
@@ -264,10 +257,8 @@ TEST(ProjectedRcm, NamesWhatNoPointExplainsAndItsSigmaHolds) {
       Lines lines = testing::fan_of_lines(truth, 40, fan_rad, random);
       const bool noisy = departure && !departure->apply;
       for (std::size_t i = 0; i < lines.size(); ++i) {
-        const Eigen::Vector2d along = (lines[i].to_px - lines[i].from_px).normalized();
         if (departure && !noisy)
-          departure->apply(lines[i], (static_cast<double>(i) + 0.5) / static_cast<double>(lines.size()),
-                           {along.y(), -along.x()}, px);
+          departure->apply(lines[i], (static_cast<double>(i) + 0.5) / static_cast<double>(lines.size()), px);
         lines[i] = testing::with_error(lines[i], noisy ? px : 1, random);
       }
       const RcmEstimate estimate = estimate_projected_rcm(lines, {scale});
@@ -285,11 +276,11 @@ TEST(ProjectedRcm, NamesWhatNoPointExplainsAndItsSigmaHolds) {
                 departure ? departure->name.c_str() : "clean", px, scale == NoiseScale::known ? "known" : "by scatter",
                 told, named, wrong, std::sqrt(squares));
     if (px > 1 || !departure) {
-      EXPECT_LE(wrong, trials / 100) << "seed " << seed;
-      EXPECT_LT(std::sqrt(squares), 1.4) << "seed " << seed;
+      EXPECT_LE(wrong, trials / 100);
+      EXPECT_LT(std::sqrt(squares), 1.4);
     }
     if (!departure) {
-      EXPECT_LE(told, trials / 20) << "seed " << seed;
+      EXPECT_LE(told, trials / 20);
     }
     return std::pair(told, named);
   };
@@ -319,16 +310,13 @@ TEST(ProjectedRcm, ParallelLinesMeetNowhere) {
 
 TEST(ProjectedRcm, SaysWhyThereIsNone) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(estimate_projected_rcm({}, {NoiseScale::known}).status, RcmStatus::too_few_lines);
+  const auto status = [](const Lines& lines) { return estimate_projected_rcm(lines, {NoiseScale::known}).status; };
+  EXPECT_EQ(status({}), RcmStatus::too_few_lines);
   const LineObservation one = line_between({0, 0}, {100, 0}, 0.3), broken = line_between({nan, 0}, {1, 1}, 1);
-  EXPECT_EQ(estimate_projected_rcm(Lines{one, broken}, {NoiseScale::known}).status, RcmStatus::too_few_lines);
-  EXPECT_EQ(estimate_projected_rcm(Lines{one, line_between({0, 9}, {100, 9}, 0.3)}, {NoiseScale::known}).status,
-            RcmStatus::parallel);
-  EXPECT_EQ(estimate_projected_rcm(Lines{one, line_between({0, 9}, {100, 9.1}, 0.3)}, {NoiseScale::known}).status,
-            RcmStatus::parallel);
-  EXPECT_EQ(
-      estimate_projected_rcm(Lines{one, broken, line_between({0, 9}, {100, 80}, 0.3)}, {NoiseScale::known}).status,
-      RcmStatus::ok);
+  EXPECT_EQ(status({one, broken}), RcmStatus::too_few_lines);
+  EXPECT_EQ(status({one, line_between({0, 9}, {100, 9}, 0.3)}), RcmStatus::parallel);
+  EXPECT_EQ(status({one, line_between({0, 9}, {100, 9.1}, 0.3)}), RcmStatus::parallel);
+  EXPECT_EQ(status({one, broken, line_between({0, 9}, {100, 80}, 0.3)}), RcmStatus::ok);
 }
 
 }  // namespace

@@ -5,9 +5,8 @@
 
 #include <Eigen/Cholesky>
 
-#include "lapservo/core/angles.h"
-#include "lapservo/core/random.h"
 #include "lapservo/rcm/line_observation.h"
+#include "lapservo/testing/seeded_random.h"
 
 namespace lapservo::testing {
 using namespace internal;

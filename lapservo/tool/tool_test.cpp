@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
-#include <vector>
 
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>

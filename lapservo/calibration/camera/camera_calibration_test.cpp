@@ -6,7 +6,6 @@
 #include <cstdio>
 #include <string>
 
-#include <Eigen/Geometry>
 #include <gtest/gtest.h>
 #include <opencv2/aruco/charuco.hpp>
 #include <opencv2/imgproc.hpp>

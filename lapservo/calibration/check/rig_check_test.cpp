@@ -2,12 +2,9 @@
 
 #include <cmath>
 #include <string>
-#include <utility>
 
-#include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
-#include "lapservo/core/angles.h"
 #include "lapservo/sim/blood.h"
 #include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/renderer.h"

@@ -1,7 +1,6 @@
 #include "lapservo/calibration/recording/frame_recording.h"
 
 #include <optional>
-#include <string>
 #include <utility>
 #include <vector>
 
