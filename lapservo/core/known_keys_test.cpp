@@ -1,6 +1,7 @@
 #include "lapservo/core/known_keys.h"
 
 #include <string>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -23,17 +24,16 @@ TEST(KnownKeys, TakesWhatItKnows) {
 }
 
 TEST(KnownKeys, NamesTheNearest) {
-  EXPECT_EQ(complaint("seem_rad: 1"),
-            "a.yaml: seem_rad: is unknown, expected a known key, of which seam_rad is the nearest");
-  EXPECT_EQ(complaint("hues_dg: 1"),
-            "a.yaml: hues_dg: is unknown, expected a known key, of which hues_deg is the nearest");
-  EXPECT_EQ(complaint("sigma_hues: 1"),
-            "a.yaml: sigma_hues: is unknown, expected a known key, of which sigma_hues_deg is the nearest");
-  EXPECT_EQ(complaint("seam: 1"), "a.yaml: seam: is unknown, expected a known key, of which seam_rad is the nearest");
-  EXPECT_EQ(complaint("sigma_name: 1"),
-            "a.yaml: sigma_name: is unknown, expected a known key, of which name is the nearest");
-  EXPECT_EQ(complaint("nme: x\nseam_rad: 1\nhues: 2\ngap: 3"),
-            "a.yaml: nme: is unknown, expected a known key, of which name is the nearest; unknown too: hues, gap");
+  const auto unknown = [](const std::string& key, const std::string& nearest) {
+    return "a.yaml: " + key + ": is unknown, expected a known key, of which " + nearest + " is the nearest";
+  };
+  for (const auto& [key, nearest] : {std::pair<std::string, std::string>{"seem_rad", "seam_rad"},
+                                     {"hues_dg", "hues_deg"},
+                                     {"sigma_hues", "sigma_hues_deg"},
+                                     {"seam", "seam_rad"},
+                                     {"sigma_name", "name"}})
+    EXPECT_EQ(complaint(key + ": 1"), unknown(key, nearest));
+  EXPECT_EQ(complaint("nme: x\nseam_rad: 1\nhues: 2\ngap: 3"), unknown("nme", "name") + "; unknown too: hues, gap");
   EXPECT_EQ(complaint(std::string(100000, 'a') + ": 1").substr(0, 10), "a.yaml: is");  // YAML's keys are shorter
 }
 

@@ -16,6 +16,7 @@
 
 #include "lapservo/core/angles.h"
 #include "lapservo/marker/marker.h"
+#include "lapservo/testing/has.h"
 #include "lapservo/testing/markers.h"
 #include "lapservo/testing/seeded_random.h"
 
@@ -27,6 +28,7 @@ using testing::random_linear_marker;
 using testing::random_marker;
 
 constexpr std::uint64_t seed = 31;
+const Marker falling = marker_with({0.0035, 0.0035, 0.017}, {0.0095, 0.0095, 0.005});
 
 // Where the cross-ratio, sampled finely, first turns back.
 std::optional<double> first_turn_rad(const Marker& marker) {
@@ -34,10 +36,6 @@ std::optional<double> first_turn_rad(const Marker& marker) {
   for (int i = 2; i < 2000; ++i)
     if ((sample(i) > sample(i - 1)) != (sample(1) > sample(0))) return i / 2000.0 * two_pi;
   return std::nullopt;
-}
-
-double tau_of(int i) {
-  return (i + 0.5) / 500 * two_pi;
 }
 
 TEST(Marker, BoundariesAreStraightFromEdgeToEdgeOfThePrint) {
@@ -64,7 +62,7 @@ TEST(Marker, BoundariesAreStraightFromEdgeToEdgeOfThePrint) {
 }
 
 TEST(Marker, TheGapIsBare) {
-  Marker marker = marker_with({0.0035, 0.0035, 0.017}, {0.0095, 0.0095, 0.005});
+  Marker marker = falling;
   EXPECT_TRUE(is_printed(marker, two_pi - 1e-9));
   EXPECT_NEAR(distance_to_seam_rad(marker, two_pi - 0.1), 0.1, 1e-12);
   EXPECT_FALSE(jumps_at_seam(marker, 0));
@@ -121,7 +119,7 @@ double round_trip_rad(const Marker& marker, double tau_rad) {
 // Just after the seam, all over the turn, and just before the seam again.
 std::vector<double> turn_from_seam_to_seam() {
   std::vector<double> turn{0, 1e-6, 1e-4};
-  for (int i = 0; i < 500; ++i) turn.push_back(tau_of(i));
+  for (int i = 0; i < 500; ++i) turn.push_back((i + 0.5) / 500 * two_pi);
   turn.insert(turn.end(), {two_pi - 1e-4, two_pi - 1e-6});
   return turn;
 }
@@ -161,15 +159,13 @@ TEST(CrossRatioDecoder, InvertsADesignWhoseFirstBoundaryIsACircle) {
 
 // Before the seam one turn ends, behind it the next one begins.
 TEST(CrossRatioDecoder, SeesTheSeamAsAWholeTurn) {
-  const Marker marker = marker_with({0.0035, 0.0035, 0.017}, {0.0095, 0.0095, 0.005});
-  EXPECT_NEAR(round_trip_rad(marker, -0.01), two_pi - 0.01, 1e-10);
-  EXPECT_NEAR(round_trip_rad(marker, 0.01), 0.01, 1e-10);
-  EXPECT_NEAR(round_trip_rad(marker, two_pi + 0.01), 0.01, 1e-10);
+  EXPECT_NEAR(round_trip_rad(falling, -0.01), two_pi - 0.01, 1e-10);
+  EXPECT_NEAR(round_trip_rad(falling, 0.01), 0.01, 1e-10);
+  EXPECT_NEAR(round_trip_rad(falling, two_pi + 0.01), 0.01, 1e-10);
 }
 
 TEST(CrossRatioDecoder, BeyondTheRangeGivesTheNearerEnd) {
   const Marker rising = marker_with({0.0095, 0.0095, 0.005}, {0.0035, 0.0035, 0.017});
-  const Marker falling = marker_with({0.0035, 0.0035, 0.017}, {0.0095, 0.0095, 0.005});
   for (const auto& [marker, at_lowest, at_highest] :
        {std::tuple(rising, 0.0, two_pi), std::tuple(falling, two_pi, 0.0)}) {
     const CrossRatioDecoder decoder(marker);
@@ -212,7 +208,7 @@ TEST(DecodingProblem, RefusesBandsThatDoNotChange) {
 }
 
 TEST(MarkerProblem, NamesTheFirstFieldThatMakesNoMarker) {
-  Marker good = marker_with({0.0035, 0.0035, 0.017}, {0.0095, 0.0095, 0.005});
+  Marker good = falling;
   EXPECT_FALSE(marker_problem(good));
   const double nan = std::nan("");
   const auto expect_problem = [&](auto Marker::*field, const auto& value, const std::string& expected) {
@@ -239,7 +235,7 @@ TEST(MarkerProblem, NamesTheFirstFieldThatMakesNoMarker) {
   expect_problem(&Marker::gap_rad, -0.1, "gap_rad: ");
   expect_problem(&Marker::wrap_m, nan, "wrap_m: ");
   good.skew_m = 1e-3;
-  EXPECT_NE(marker_problem(good)->text().find("skew_m"), std::string::npos);
+  EXPECT_TRUE(testing::has(marker_problem(good)->text(), "skew_m"));
 }
 
 // Cyclic orders differ, small shades do not; from the tip an order is reversed.
@@ -283,12 +279,11 @@ TEST(TauByLength, InvertsEveryBandThatChanges) {
 }
 
 TEST(TauByLength, ClampsWhatNoBandShows) {
-  const Marker marker = marker_with({0.0035, 0.0035, 0.017}, {0.0095, 0.0095, 0.005});
-  EXPECT_EQ(tau_by_length_rad(marker, 0, 0), 0);
-  EXPECT_EQ(tau_by_length_rad(marker, 0, 1), two_pi);
-  EXPECT_EQ(tau_by_length_rad(marker, 2, 0), two_pi);
-  EXPECT_EQ(tau_by_length_rad(marker, 2, 1), 0);
-  EXPECT_TRUE(std::isnan(tau_by_length_rad(marker, 0, std::numeric_limits<double>::infinity())));
+  EXPECT_EQ(tau_by_length_rad(falling, 0, 0), 0);
+  EXPECT_EQ(tau_by_length_rad(falling, 0, 1), two_pi);
+  EXPECT_EQ(tau_by_length_rad(falling, 2, 0), two_pi);
+  EXPECT_EQ(tau_by_length_rad(falling, 2, 1), 0);
+  EXPECT_TRUE(std::isnan(tau_by_length_rad(falling, 0, std::numeric_limits<double>::infinity())));
 }
 
 TEST(TauByLength, RefusesABandThatStaysAsLong) {

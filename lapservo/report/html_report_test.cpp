@@ -59,15 +59,10 @@ TEST(HtmlReport, SaysEverythingOnceAndThePapersFiguresInTheSummaryToo) {
   report.sections[0].comparisons[1].surface = "our-figure";
   report.sections[0].notes = {"a-note"};
   const std::string html = html_from(report);
-  const auto count = [&html](const std::string& what) {
-    int n = 0;
-    for (std::size_t at = html.find(what); at != std::string::npos; at = html.find(what, at + 1)) ++n;
-    return n;
-  };
-  EXPECT_EQ(count("the-papers-figure"), 2);
-  EXPECT_EQ(count("our-figure"), 1);
-  EXPECT_EQ(count("a-note"), 1);
-  EXPECT_EQ(count("one.csv"), 1);
+  EXPECT_EQ(testing::count_of(html, "the-papers-figure"), 2U);
+  EXPECT_EQ(testing::count_of(html, "our-figure"), 1U);
+  EXPECT_EQ(testing::count_of(html, "a-note"), 1U);
+  EXPECT_EQ(testing::count_of(html, "one.csv"), 1U);
   EXPECT_EQ(html, html_from(report)) << "the same report, the same bytes";
 }
 

@@ -13,15 +13,9 @@
 
 namespace lapservo::internal {
 namespace svg_plot_test {
+using testing::count_of;
 
 constexpr std::uint64_t seed = 71;
-
-// Positions of all "what" in the text.
-std::size_t count_of(const std::string& text, const std::string& what) {
-  std::size_t count = 0;
-  for (std::size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + 1)) ++count;
-  return count;
-}
 
 TEST(Ticks, AreRoundEvenAndInside) {
   Random random(seed);

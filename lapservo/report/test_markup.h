@@ -7,6 +7,12 @@
 
 namespace lapservo::testing {
 
+inline std::size_t count_of(const std::string& text, const std::string& what) {
+  std::size_t count = 0;
+  for (std::size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + 1)) ++count;
+  return count;
+}
+
 /// The fault of a tag's attributes, each ` name="value"`; cuts them off.
 inline std::string attribute_problem(std::string& tag) {
   std::set<std::string> names;

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/rig/rig.h"
+#include "lapservo/testing/has.h"
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
 
@@ -123,8 +124,7 @@ TEST(CameraFormats, OfOurOwnStayAsTheyAre) {
 }
 
 void expect_refused(const std::string& text, const std::string& why) {
-  const std::string error = testing::input_error([&] { camera_of(text); });
-  EXPECT_NE(error.find(why), std::string::npos) << error;
+  EXPECT_TRUE(testing::has(testing::input_error([&] { camera_of(text); }), why));
 }
 
 TEST(CameraFormats, ThatLackNumbersNameAllThatIsMissing) {

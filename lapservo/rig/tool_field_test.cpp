@@ -6,12 +6,14 @@
 
 #include "lapservo/rig/rig.h"
 #include "lapservo/rig/rig_writer.h"
+#include "lapservo/testing/has.h"
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
 #include "lapservo/tool/test_tools.h"
 
 namespace lapservo::internal {
 namespace {
+using testing::has;
 using testing::input_error;
 
 const std::string before_tool = R"(
@@ -80,19 +82,17 @@ TEST(ToolField, IsWrittenAsItIsRead) {
 }
 
 TEST(ToolField, RefusesWhatIsImplausible) {
-  EXPECT_NE(error_of("{tip_in_marker_m: [0, 0, 120]}").find("look like millimetres"), std::string::npos);
-  EXPECT_NE(error_of("{tip_in_marker_m: [0, 0, 0.1], length: 3}").find("unknown"), std::string::npos);
-  EXPECT_NE(error_of("{tip_in_marker_m: [0, 0, 0.1], covariance: {data: [1, 2, 0, 0, 1, 0, 0, 0, 1]}}").find("symm"),
-            std::string::npos);
-  EXPECT_NE(error_of("{" + wrist + "wrist_in_marker_m: [0, 0, 0.05]}").find("azimuth_rad: is missing"),
-            std::string::npos);
-  EXPECT_NE(error_of("{" + wrist + "azimuth_rad: 0.5}").find("wrist_in_marker_m beside it"), std::string::npos);
-  EXPECT_NE(error_of("{" + wrist + "offset_rad: [3, 90]}").find("look like degrees"), std::string::npos);
-  EXPECT_NE(error_of("{" + wrist + "offset_rad: [3]}").find("one for each joint"), std::string::npos);
-  EXPECT_NE(error_of("{" + wrist + "sigma_reading_rad: [0.1, -0.1]}").find("standard dev"), std::string::npos);
-  EXPECT_NE(error_of("{joints: [], tip_in_last_joint_m: [0, 0, 0]}").find("one to four"), std::string::npos);
+  EXPECT_TRUE(has(error_of("{tip_in_marker_m: [0, 0, 120]}"), "look like millimetres"));
+  EXPECT_TRUE(has(error_of("{tip_in_marker_m: [0, 0, 0.1], length: 3}"), "unknown"));
+  EXPECT_TRUE(has(error_of("{tip_in_marker_m: [0, 0, 0.1], covariance: {data: [1, 2, 0, 0, 1, 0, 0, 0, 1]}}"), "symm"));
+  EXPECT_TRUE(has(error_of("{" + wrist + "wrist_in_marker_m: [0, 0, 0.05]}"), "azimuth_rad: is missing"));
+  EXPECT_TRUE(has(error_of("{" + wrist + "azimuth_rad: 0.5}"), "wrist_in_marker_m beside it"));
+  EXPECT_TRUE(has(error_of("{" + wrist + "offset_rad: [3, 90]}"), "look like degrees"));
+  EXPECT_TRUE(has(error_of("{" + wrist + "offset_rad: [3]}"), "one for each joint"));
+  EXPECT_TRUE(has(error_of("{" + wrist + "sigma_reading_rad: [0.1, -0.1]}"), "standard dev"));
+  EXPECT_TRUE(has(error_of("{joints: [], tip_in_last_joint_m: [0, 0, 0]}"), "one to four"));
   EXPECT_NE(error_of("{}"), "");
-  EXPECT_NE(error_of("nowhere.json").find("nowhere.json"), std::string::npos);
+  EXPECT_TRUE(has(error_of("nowhere.json"), "nowhere.json"));
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/renderer.h"
 #include "lapservo/sim/tissue.h"
+#include "lapservo/testing/has.h"
 #include "lapservo/testing/scenes.h"
 
 namespace lapservo::internal {
@@ -16,7 +17,6 @@ namespace {
 
 constexpr double fps = 6, delay_s = 0.1;
 constexpr int frames = 108;
-
 constexpr double phi_swing_rad = 0.18;
 
 JointVector q_at(double t, double phi_rad = phi_swing_rad) {
@@ -87,7 +87,7 @@ class CheckRig : public ::testing::Test {
   static void expect_first(const RigFindings& findings, const std::string& word) {
     const auto texts = needed(findings);
     ASSERT_FALSE(texts.empty()) << word;
-    EXPECT_NE(texts.front().find(word), std::string::npos) << texts.front();
+    EXPECT_TRUE(testing::has(texts.front(), word));
   }
 
   Rig rig = true_rig();
@@ -235,7 +235,7 @@ TEST_F(CheckRig, NamesAWrongResponseFirst) {
   expect_first(findings, "than the rig says and a board did, rather as srgb");
   expect_first(findings, "lapservo calibrate colour --replace-response");
   findings.lossy = true;  // which moves edges, too
-  for (const std::string& text : needed(findings)) EXPECT_EQ(text.find("encodes light"), std::string::npos) << text;
+  for (const std::string& text : needed(findings)) EXPECT_FALSE(testing::has(text, "encodes light"));
 }
 
 TEST_F(CheckRig, WithoutJointsComparesTheRcm) {

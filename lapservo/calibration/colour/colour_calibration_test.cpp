@@ -1,7 +1,6 @@
 #include "lapservo/calibration/colour/colour_calibration.h"
 
 #include <cmath>
-#include <cstdio>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -9,11 +8,13 @@
 #include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/renderer.h"
 #include "lapservo/sim/tissue.h"
+#include "lapservo/testing/has.h"
 #include "lapservo/testing/scenes.h"
 #include "lapservo/vision/colour/colour_classes.h"
 
 namespace lapservo::internal {
 namespace {
+using testing::has;
 
 struct Film {
   int frames = 24;
@@ -91,7 +92,7 @@ TEST_F(CalibrateColour, TellsAnotherResponse) {
   }
   const auto kept = calibrate_colour(rig, 0, filmed(real, {}), true);
   EXPECT_FALSE(kept.response);
-  EXPECT_NE(kept.response_found.find("the marker alone says gamma:1.8"), std::string::npos) << kept.response_found;
+  EXPECT_TRUE(has(kept.response_found, "the marker alone says gamma:1.8"));
 }
 
 // 1.4 and 1.6 lie between those that it tries.
@@ -99,18 +100,17 @@ TEST_F(CalibrateColour, NamesAResponseThatIsNoUsualOne) {
   for (const auto& [gamma, is_usual] : {std::pair(1.4, false), {1.6, false}, {1.8, true}, {2.2, true}}) {
     real.camera.response = {Response::Kind::power, gamma};
     const std::string found = calibrate_colour(rig, 0, filmed(real, {})).response_found;
-    std::printf("  gamma %.1f: %s\n", gamma, found.c_str());
     EXPECT_EQ(found.find("no usual one explains") == std::string::npos, is_usual) << found;
   }
 }
 
 TEST_F(CalibrateColour, RefusesWhatCanNotTell) {
   const auto refusal = [&](const Film& film) { return calibrate_colour(rig, 0, filmed(real, film)).refusal; };
-  EXPECT_NE(refusal({.frames = 5}).find("at least"), std::string::npos);
-  EXPECT_NE(refusal({.frames = 10, .motion = 0}).find("move the instrument"), std::string::npos);
-  EXPECT_NE(refusal({.frames = 10, .light = 6}).find("lower the exposure"), std::string::npos);
+  EXPECT_TRUE(has(refusal({.frames = 5}), "at least"));
+  EXPECT_TRUE(has(refusal({.frames = 10, .motion = 0}), "move the instrument"));
+  EXPECT_TRUE(has(refusal({.frames = 10, .light = 6}), "lower the exposure"));
   const std::vector<cv::Mat> nothing(10, scenes::render_nothing(rig, 3));
-  EXPECT_NE(calibrate_colour(rig, 0, nothing).refusal.find("0 of 10 frames"), std::string::npos);
+  EXPECT_TRUE(has(calibrate_colour(rig, 0, nothing).refusal, "0 of 10 frames"));
 }
 
 // A white balance that moves over the recording, or light that changes its colour as it dims: refused, or named with
@@ -135,13 +135,10 @@ TEST_F(CalibrateColour, NamesHuesThatAreNotOne) {
         worst = std::max(worst, hue_gap_deg(found.hues_deg[band], real.instruments[0].marker.hues_deg[band]) /
                                     found.sigma_hues_deg[band]);
       const std::string said = found.refusal + (found.faults.empty() ? "" : found.faults[0]);
-      std::printf("  %s by %.2f: error / sigma up to %.2f, %s\n", over_time ? "over time" : "with light", by, worst,
-                  said.c_str());
-      EXPECT_LT(worst, 4);
+      SCOPED_TRACE(::testing::Message() << (over_time ? "over time by " : "with light by ") << by);
+      EXPECT_LT(worst, 4) << said;
       EXPECT_TRUE(by > 0 || said.empty()) << said;
-      if (by == 0.2) {
-        EXPECT_NE(said.find(over_time ? "over the recording" : "to the brightest"), std::string::npos) << said;
-      }
+      EXPECT_TRUE(by != 0.2 || has(said, over_time ? "over the recording" : "to the brightest")) << said;
       EXPECT_TRUE(by < 0.6 || !over_time || !found.refusal.empty());
     }
 }

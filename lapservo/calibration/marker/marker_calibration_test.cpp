@@ -6,8 +6,8 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/core/angles.h"
+#include "lapservo/testing/has.h"
 #include "lapservo/testing/scenes.h"
-#include "lapservo/vision/tracker.h"
 
 namespace lapservo::internal {
 namespace {
@@ -80,21 +80,6 @@ TEST_F(CalibrateMarker, FindsThePrintAsItIs) {
     EXPECT_EQ(calibration.marker.diameter_m, nominal.diameter_m);
     EXPECT_EQ(calibration.marker.seam_rad, nominal.seam_rad);
     EXPECT_GE(calibration.seam_views, 5U);
-
-    // And the tracker accepts it where it refused the rig's.
-    Rig better = rig, real = rig;
-    better.instruments[0].marker = calibration.marker, real.instruments[0].marker = print;
-    Random random(8);
-    int believed = 0;
-    for (int i = 0; i < 5; ++i) {
-      const JointVector q = scenes::random_configuration(rig, 0, random);
-      const cv::Mat frame = scenes::render(real, {q}, static_cast<std::uint64_t>(100 + i));
-      believed += Tracker(rig, {.single = true}).track(frame)[0].status == Status::ok;
-      const Observation o = Tracker(better, {.single = true}).track(frame)[0];
-      ASSERT_EQ(o.status, Status::ok);
-      EXPECT_NEAR(wrap_pi(o.rcm->q.psi_rad - q.psi_rad), 0, 5e-3);
-    }
-    EXPECT_LE(believed, 1);
   }
 }
 
@@ -133,9 +118,9 @@ TEST_F(CalibrateMarker, RefusesWhatCanNotTell) {
   const auto refusal = [&](const Turn& turn) {
     return calibrate_marker(rig, 0, turned(rig, print, turn).take()).refusal;
   };
-  EXPECT_NE(refusal({.frames = 40, .fraction = 0.6}).find("from all sides"), std::string::npos);
-  EXPECT_NE(refusal({.frames = 6}).find("at least"), std::string::npos);
-  EXPECT_NE(refusal({.frames = 30, .blur_px = 1.8}).find("blurred"), std::string::npos);
+  EXPECT_TRUE(testing::has(refusal({.frames = 40, .fraction = 0.6}), "from all sides"));
+  EXPECT_TRUE(testing::has(refusal({.frames = 6}), "at least"));
+  EXPECT_TRUE(testing::has(refusal({.frames = 30, .blur_px = 1.8}), "blurred"));
   EXPECT_NE(refusal({.frames = 30, .blur_px = 6}), "");
   EXPECT_NE(calibrate_marker(rig, 0, {}).refusal, "");
 }
