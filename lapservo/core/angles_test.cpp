@@ -1,25 +1,21 @@
 #include "lapservo/core/angles.h"
 
 #include <cmath>
-#include <cstdint>
 #include <limits>
 
 #include <gtest/gtest.h>
 
-#include "lapservo/core/random.h"
+#include "lapservo/testing/seeded_random.h"
 
 namespace lapservo::internal {
 namespace {
-
-constexpr std::uint64_t seed = 11;
 
 double angular_distance(double a_rad, double b_rad) {
   return std::abs(std::remainder(a_rad - b_rad, two_pi));
 }
 
 TEST(Angles, WrappingKeepsTheAngleAndLandsInTheInterval) {
-  SCOPED_TRACE(seed);
-  Random random(seed);
+  testing::SeededRandom random(11);
   for (int i = 0; i < 10000; ++i) {
     const double angle_rad = random.uniform(-100, 100);
     const double centred = wrap_pi(angle_rad), positive = wrap_two_pi(angle_rad);

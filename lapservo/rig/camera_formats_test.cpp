@@ -127,7 +127,8 @@ void expect_refused(const std::string& text, const std::string& why) {
   EXPECT_TRUE(testing::has(testing::input_error([&] { camera_of(text); }), why));
 }
 
-TEST(CameraFormats, ThatLackNumbersNameAllThatIsMissing) {
+TEST(CameraFormats, ThatLackNumbersOrHoldSeveralCamerasAreRefused) {
+  expect_refused(std::string(kalibr) + "cam1: {}\n", "several cameras");
   expect_refused(replaced(opencv, "image_width: 640\nimage_height: 480\n", ""),
                  "an OpenCV calibration without image_width, image_height");
 }
@@ -145,10 +146,6 @@ TEST(CameraFormats, OfCamerasThatAreNotModelledAreRefused) {
   expect_remedy(replaced(kalibr, "pinhole", "omni"), "omni");
   expect_remedy(replaced(opencv, "board_width: 9", "fisheye_model: 1"), "fisheye");
   expect_remedy(replaced(ros2, "- 0.0\nk:", "- 0.3\nk:"), "rational");
-}
-
-TEST(CameraFormats, OfSeveralCamerasAreRefused) {
-  expect_refused(std::string(kalibr) + "cam1: {}\n", "several cameras");
 }
 
 }  // namespace

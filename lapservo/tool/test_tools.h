@@ -13,28 +13,21 @@ inline constexpr std::string_view invented_tool_json = R"(/* -*- Mode: Javascrip
     "DH": {
         "convention": "modified",
         "joints": [
-            {
-                "name": "roll",
+            {   "name": "roll",
                 "alpha":  0.0000, "A":  0.0000, "theta":  0.3000, "D":  0.4100,
-                "type": "revolute",
-                "mode": "active",
+                "type": "revolute", "mode": "active",
                 "offset":  0.0000,
                 "qmin": -4.5, // -258 degrees
-                "qmax":  4.5,
-                "ftmax": 0.33
+                "qmax":  4.5, "ftmax": 0.33
             },
-            {
-                "name": "wrist_pitch",
+            {   "name": "wrist_pitch",
                 "alpha": -1.5708, "A":  0.0000, "theta":  0.0000, "D":  0.0000,
-                "type": "revolute",
-                "mode": "active",
+                "type": "revolute", "mode": "active",
                 "offset": -1.5708
             },
-            {
-                "name": "wrist_yaw",
+            {   "name": "wrist_yaw",
                 "alpha": -1.5708, "A":  0.0085, "theta":  0.1000, "D":  0.0010,
-                "type": "revolute",
-                "mode": "active",
+                "type": "revolute", "mode": "active",
                 "offset": -1.5
             }
         ]
