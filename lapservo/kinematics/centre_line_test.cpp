@@ -7,6 +7,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
@@ -96,28 +97,19 @@ TEST(CentreLine, ItsPointsLieOnTheSurfaceWhereTheBandsEnd) {
       });
 }
 
-TEST(CentreLine, TurningTheInstrumentTurnsTauBackAndMovesNothingElse) {
+TEST(CentreLine, TurningTheInstrumentOrItsSeamTurnsTauBackAndMovesNothingElse) {
   for_random_configurations(
       [](const Camera& camera, const Instrument& instrument, const JointVector& q, const CentreLine& line) {
-        const double turn_rad = 1.1;
-        const auto turned =
-            centre_line(camera, instrument.marker, camera_from_unrolled(instrument, q), q.psi_rad + turn_rad);
-        ASSERT_TRUE(turned);
-        EXPECT_NEAR(wrap_pi(turned->tau_rad + turn_rad - line.tau_rad), 0, 1e-9);
-        EXPECT_EQ(turned->facing_azimuth_rad, line.facing_azimuth_rad);
-        EXPECT_LT((turned->ideal_px[0] - line.ideal_px[0]).norm(), 1e-9);
-        EXPECT_LT((turned->ideal_px[3] - line.ideal_px[3]).norm(), 1e-9);
-      });
-}
-
-TEST(CentreLine, ASeamShiftsTauAsARotationDoes) {
-  for_random_configurations(
-      [](const Camera& camera, const Instrument& instrument, const JointVector& q, const CentreLine& line) {
-        Marker shifted = instrument.marker;
-        shifted.seam_rad += 0.7;
-        const auto other = centre_line(camera, shifted, camera_from_unrolled(instrument, q), q.psi_rad - 0.7);
-        ASSERT_TRUE(other);
-        EXPECT_NEAR(wrap_pi(other->tau_rad - line.tau_rad), 0, 1e-9);
+        for (const auto& [turn_rad, seam_rad] : {std::pair(1.1, 0.0), {-0.7, 0.7}}) {
+          Marker marker = instrument.marker;
+          marker.seam_rad += seam_rad;
+          const auto turned = centre_line(camera, marker, camera_from_unrolled(instrument, q), q.psi_rad + turn_rad);
+          ASSERT_TRUE(turned);
+          EXPECT_NEAR(wrap_pi(turned->tau_rad + turn_rad + seam_rad - line.tau_rad), 0, 1e-9);
+          EXPECT_EQ(turned->facing_azimuth_rad, line.facing_azimuth_rad);
+          EXPECT_LT((turned->ideal_px[0] - line.ideal_px[0]).norm(), 1e-9);
+          EXPECT_LT((turned->ideal_px[3] - line.ideal_px[3]).norm(), 1e-9);
+        }
       });
 }
 

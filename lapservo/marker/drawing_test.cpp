@@ -189,13 +189,16 @@ void expect_wraps_into(const Page& page, const Marker& marker, double mm_per_mm)
   }
 }
 
-// Calls with the sheet read back from an SVG and from a PDF.
+// Calls with the sheet read back from an SVG and from a PDF, which have the paper's size.
 void for_sheets(const Marker& marker, Paper paper, int copies, const std::function<void(const Page&)>& law) {
   const TemporaryFolder folder;
   for (const char* name : {"sheet.svg", "sheet.pdf"}) {
     SCOPED_TRACE(name);
     write_print_sheet(folder / name, "PSM1", marker, paper, copies);
-    law(std::string_view(name).ends_with("svg") ? read_svg(folder / name) : read_pdf(folder / name));
+    const Page page = std::string_view(name).ends_with("svg") ? read_svg(folder / name) : read_pdf(folder / name);
+    const Vector2d size_mm = paper == Paper::a4 ? Vector2d(210, 297) : Vector2d(215.9, 279.4);
+    EXPECT_LT((Vector2d(page.width_mm, page.height_mm) - size_mm).norm(), rounding_mm);
+    law(page);
   }
 }
 
@@ -208,13 +211,6 @@ TEST(PrintSheet, WrappedAroundTheShaftGivesTheBoundariesThatTheMarkerPredicts) {
     marker.hues_deg = {30, 150, 270};
     for_sheets(marker, Paper::letter, 1, [&](const Page& page) { expect_wraps_into(page, marker, 1); });
   }
-}
-
-TEST(PrintSheet, HasTheSizeOfItsPaper) {
-  for (const auto& [paper, size_mm] : {std::pair(Paper::a4, Vector2d(210, 297)), {Paper::letter, {215.9, 279.4}}})
-    for_sheets(example, paper, 1, [expected_mm = Vector2d(size_mm)](const Page& page) {
-      EXPECT_LT((Vector2d(page.width_mm, page.height_mm) - expected_mm).norm(), rounding_mm);
-    });
 }
 
 // Both ends of each line of an SVG page.

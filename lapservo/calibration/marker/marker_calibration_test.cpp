@@ -1,7 +1,6 @@
 #include "lapservo/calibration/marker/marker_calibration.h"
 
 #include <cmath>
-#include <string>
 
 #include <gtest/gtest.h>
 
