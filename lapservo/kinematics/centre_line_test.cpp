@@ -135,35 +135,30 @@ TEST(Features, MeasureAnglesFromTheVerticalAndDistances) {
   EXPECT_FALSE(features_of(right, std::nullopt).r_px);
 }
 
-// To first order: against the spread of the features of sampled points.
-TEST(Features, CovarianceIsThatOfSampledPoints) {
+TEST(Features, CovarianceIsThatOfFiniteDifferences) {
   testing::SeededRandom random(seed);
   const std::array<Eigen::Vector2d, 4> edges_px{{{310, 250}, {352, 221}, {399, 187}, {520, 102}}};
   const Eigen::Vector2d rcm_px(-120, 560);
   EdgesCovariance root;
   for (double& entry : root.reshaped()) entry = 0.02 * random.normal();
-  const auto vector = [&](const std::array<Eigen::Vector2d, 4>& points) {
-    const Features f = features_of(points, rcm_px);
-    return Eigen::Vector4d(f.s_rad, *f.r_px, f.l_px, f.d_px);
-  };
-  const Eigen::Vector4d middle = vector(edges_px);
-  constexpr int samples = 40000;
-  Eigen::Matrix4d spread = Eigen::Matrix4d::Zero();
-  for (int i = 0; i < samples; ++i) {
-    Eigen::Matrix<double, 8, 1> deviate;
-    for (double& entry : deviate) entry = random.normal();
-    const Eigen::Matrix<double, 8, 1> error = root * deviate;
-    auto points = edges_px;
-    for (std::size_t k = 0; k < 4; ++k) points[k] += error.segment<2>(2 * static_cast<Eigen::Index>(k));
-    const Eigen::Vector4d change = vector(points) - middle;
-    spread += change * change.transpose() / samples;
+  const EdgesCovariance of_edges = root * root.transpose();
+  Eigen::Matrix<double, 4, 8> slopes;
+  for (Eigen::Index i = 0; i < 8; ++i) {
+    const auto moved = [&](double by_px) {
+      auto points = edges_px;
+      points[static_cast<std::size_t>(i / 2)][i % 2] += by_px;
+      const Features f = features_of(points, rcm_px);
+      return Eigen::Vector4d(f.s_rad, *f.r_px, f.l_px, f.d_px);
+    };
+    slopes.col(i) = (moved(1e-3) - moved(-1e-3)) / 2e-3;
   }
-  const Eigen::Matrix4d covariance = features_covariance(edges_px, root * root.transpose(), rcm_px);
+  const Eigen::Matrix4d expected = slopes * of_edges * slopes.transpose();
+  const Eigen::Matrix4d covariance = features_covariance(edges_px, of_edges, rcm_px);
   EXPECT_EQ(covariance, covariance.transpose());
   for (int i = 0; i < 4; ++i)
     for (int j = 0; j < 4; ++j)
-      EXPECT_NEAR(covariance(i, j), spread(i, j), 0.03 * std::sqrt(covariance(i, i) * covariance(j, j))) << i << j;
-  const Eigen::Matrix4d without = features_covariance(edges_px, root * root.transpose(), std::nullopt);
+      EXPECT_NEAR(covariance(i, j), expected(i, j), 1e-5 * std::sqrt(covariance(i, i) * covariance(j, j))) << i << j;
+  const Eigen::Matrix4d without = features_covariance(edges_px, of_edges, std::nullopt);
   EXPECT_TRUE(without.row(1).isZero(0) && without.col(1).isZero(0));
   const Eigen::Matrix2d lengths = covariance.bottomRightCorner<2, 2>(), same = without.bottomRightCorner<2, 2>();
   EXPECT_EQ(same, lengths);

@@ -1,10 +1,9 @@
 #include "lapservo/marker/sensitivity.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
-#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -18,8 +17,6 @@ namespace lapservo::internal {
 namespace sensitivity_test {
 using testing::marker_with;
 
-constexpr std::uint64_t seed = 43;
-
 const Marker linear = marker_with({0.0035, 0.0035, 0.017}, {0.0095, 0.0095, 0.005});
 const Marker non_linear = marker_with({0.004, 0.012, 0.008}, {0.012, 0.004, 0.008});
 
@@ -32,56 +29,50 @@ TEST(CrossRatioSlope, IsTheFiniteDifference) {
     }
 }
 
-// Root mean square of tau decoded from boundaries measured with noise.
-double decoded_sigma_rad(const Marker& marker, double tau_rad, const Viewing& viewing, Random& random) {
-  constexpr int draws = 20000;
+// How much each boundary moves what the decoder reads, rad per m: finite differences.
+std::array<double, 4> decoded_by_boundaries(const Marker& marker, double tau_rad) {
+  constexpr double step_m = 1e-7;
   const CrossRatioDecoder decoder(marker);
-  double sum = 0;
-  for (int i = 0; i < draws; ++i) {
-    auto e_px = boundaries_m(marker, tau_rad);
-    for (double& e : e_px) e = e * viewing.px_per_m() + viewing.sigma_edge_px * random.normal();
-    const double ratio = cross_ratio(e_px[1] - e_px[0], e_px[2] - e_px[1], e_px[3] - e_px[2]);
-    const double error_rad = decoder.tau_rad(ratio) - tau_rad;
-    sum += error_rad * error_rad;
+  std::array<double, 4> by_boundaries{};
+  for (std::size_t k = 0; k < 4; ++k) {
+    const auto decoded_rad = [&](double by_m) {
+      auto e = boundaries_m(marker, tau_rad);
+      e.at(k) += by_m;
+      return decoder.tau_rad(cross_ratio(e[1] - e[0], e[2] - e[1], e[3] - e[2]));
+    };
+    by_boundaries.at(k) = (decoded_rad(step_m) - decoded_rad(-step_m)) / (2 * step_m);
   }
-  return std::sqrt(sum / draws);
+  return by_boundaries;
 }
 
-TEST(PredictedSigma, OfTheCentreLineIsTheSpreadOfWhatIsDecoded) {
-  testing::SeededRandom random(seed);
+TEST(TauByBoundaries, IsWhatTheDecoderMistakes) {
+  Marker marker = linear;
+  marker.wrap_m = 1e-3, marker.gap_rad = 0.1;
+  for (const double tau_rad : {0.5, 3.0, 5.5}) {
+    const auto expected = decoded_by_boundaries(marker, tau_rad), by_boundaries = tau_by_boundaries(marker, tau_rad);
+    for (std::size_t k = 0; k < 4; ++k)
+      EXPECT_NEAR(expected.at(k), by_boundaries.at(k), 1e-3 * std::abs(by_boundaries.at(k)) + 1e-3);
+  }
+}
+
+TEST(PredictedSigma, OfTheCentreLineIsThatOfWhatIsDecoded) {
   const Viewing viewing{1100, 0.11, 0.05};
   for (const Marker& marker : {linear, non_linear})
-    for (const double tau_rad : {0.5, 1.7, 3.1, 4.4, 5.8})
-      EXPECT_NEAR(decoded_sigma_rad(marker, tau_rad, viewing, random) /
-                      predicted_sigma_centre_line_rad(marker, tau_rad, viewing),
-                  1, 0.03)
-          << "tau " << tau_rad;
+    for (const double tau_rad : {0.5, 1.7, 3.1, 4.4, 5.8}) {
+      double square = 0;
+      for (const double by_boundary : decoded_by_boundaries(marker, tau_rad)) square += by_boundary * by_boundary;
+      const double sigma_rad = viewing.sigma_edge_px / viewing.px_per_m() * std::sqrt(square);
+      EXPECT_NEAR(sigma_rad / predicted_sigma_centre_line_rad(marker, tau_rad, viewing), 1, 0.03) << "tau " << tau_rad;
+    }
 }
 
-// tau and a shift along the axis, fitted by least squares to all boundaries seen on lines one pixel apart, from the
-// lengths of the bands alone. An inner boundary whose place is within the seam's blur is left out.
-class SurfaceFit {
- public:
-  SurfaceFit(const Marker& marker, double tau_rad, const Viewing& viewing) : sigma_px_(viewing.sigma_edge_px) {
-    px_per_m_ = viewing.px_per_m();
-    const double radius_px = marker.radius_m() * px_per_m_, reach_px = 0.9 * radius_px;
-    for (double offset_px = -reach_px + 0.5; offset_px < reach_px; offset_px += 1)
-      add_line(marker, wrap_two_pi(tau_rad + std::asin(offset_px / radius_px)), offset_px, radius_px);
-  }
-
-  // Error of the fitted tau for one draw of the noise: the map is linear between seam and seam.
-  double error_rad(Random& random) const {
-    double b_tau = 0, b_shift = 0;
-    for (const double slope : slopes_px_) {
-      const double noise_px = sigma_px_ * random.normal();
-      b_tau += slope * noise_px, b_shift += noise_px;
-    }
-    const double n = static_cast<double>(slopes_px_.size());
-    return (b_tau * n - b_shift * sum_) / (squares_ * n - sum_ * sum_);
-  }
-
- private:
-  void add_line(const Marker& marker, double line_tau_rad, double offset_px, double radius_px) {
+// Sigma of tau where least squares fit it, and a shift along the axis, to all boundaries seen on lines one pixel apart,
+// from the lengths of the bands alone. An inner boundary whose place is within the seam's blur is left out.
+double fitted_sigma_rad(const Marker& marker, double tau_rad, const Viewing& viewing) {
+  const double radius_px = marker.radius_m() * viewing.px_per_m(), reach_px = 0.9 * radius_px;
+  double count = 0, sum = 0, squares = 0;
+  for (double offset_px = -reach_px + 0.5; offset_px < reach_px; offset_px += 1) {
+    const double line_tau_rad = wrap_two_pi(tau_rad + std::asin(offset_px / radius_px));
     // Foreshortened: the seam's distance in the image.
     const double cosine = std::sqrt(1 - offset_px * offset_px / (radius_px * radius_px));
     const double seam_px = std::min(line_tau_rad, two_pi - line_tau_rad) * radius_px * cosine;
@@ -90,27 +81,20 @@ class SurfaceFit {
     for (std::size_t k = 0; k < 4; ++k) {
       const bool inner = k == 1 || k == 2;
       if (inner && seam_px < 2.5) continue;
-      slopes_px_.push_back((beside[k] - here[k]) / step_rad * px_per_m_);
-      sum_ += slopes_px_.back(), squares_ += slopes_px_.back() * slopes_px_.back();
+      const double slope_px = (beside[k] - here[k]) / step_rad * viewing.px_per_m();
+      ++count, sum += slope_px, squares += slope_px * slope_px;
     }
   }
+  return viewing.sigma_edge_px / std::sqrt(squares - sum * sum / count);
+}
 
-  double sigma_px_, px_per_m_ = 0, sum_ = 0, squares_ = 0;
-  std::vector<double> slopes_px_;
-};
-
-TEST(PredictedSigma, OfTheSurfaceIsTheSpreadOfItsLeastSquaresFit) {
-  testing::SeededRandom random(seed);
+TEST(PredictedSigma, OfTheSurfaceIsThatOfItsLeastSquaresFit) {
   const Viewing viewing{1100, 0.11, 0.1};
   for (const Marker& marker : {linear, non_linear})
-    for (const double tau_rad : {0.0, 0.4, 3.0, 5.9}) {
-      const SurfaceFit fit(marker, tau_rad, viewing);
-      constexpr int draws = 5000;
-      double sum = 0;
-      for (int i = 0; i < draws; ++i) sum += std::pow(fit.error_rad(random), 2);
-      EXPECT_NEAR(std::sqrt(sum / draws) / predicted_sigma_surface_rad(marker, tau_rad, viewing), 1, 0.04)
+    for (const double tau_rad : {0.0, 0.4, 3.0, 5.9})
+      EXPECT_NEAR(fitted_sigma_rad(marker, tau_rad, viewing) / predicted_sigma_surface_rad(marker, tau_rad, viewing), 1,
+                  0.02)
           << "tau " << tau_rad;
-    }
 }
 
 TEST(PredictedSigma, GrowsWithNoiseAndDistanceAndFallsWithFocalLength) {
@@ -125,23 +109,6 @@ TEST(PredictedSigma, GrowsWithNoiseAndDistanceAndFallsWithFocalLength) {
     // Half the size and half the lines; more are lost to the seam.
     EXPECT_NEAR(predicted_sigma_surface_rad(linear, tau_rad, far_away) / surface, 2 * std::sqrt(2), 0.2);
     EXPECT_NEAR(predicted_sigma_surface_rad(linear, tau_rad, as_far), surface, 1e-12);
-  }
-}
-
-// A boundary that is moved by little moves what the decoder reads by as much as the sensitivity says.
-TEST(TauByBoundaries, IsWhatTheDecoderMistakes) {
-  Marker marker = linear;
-  marker.wrap_m = 1e-3, marker.gap_rad = 0.1;
-  const CrossRatioDecoder decoder(marker);
-  constexpr double step_m = 1e-7;
-  for (const double tau_rad : {0.5, 3.0, 5.5}) {
-    const auto by_boundaries = tau_by_boundaries(marker, tau_rad);
-    for (std::size_t k = 0; k < 4; ++k) {
-      auto e = boundaries_m(marker, tau_rad);
-      e.at(k) += step_m;
-      const double read_rad = decoder.tau_rad(cross_ratio(e[1] - e[0], e[2] - e[1], e[3] - e[2]));
-      EXPECT_NEAR((read_rad - tau_rad) / step_m, by_boundaries.at(k), 1e-3 * std::abs(by_boundaries.at(k)) + 1e-3);
-    }
   }
 }
 
