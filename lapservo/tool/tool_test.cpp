@@ -41,6 +41,22 @@ Motion slope(const Pose& pose) {
   return motion_between(pose(-step), pose(step)) / (2 * step);
 }
 
+// The covariance by the sigmas of both readings: of the joint of each, and of its mirror image in a snake.
+template <typename Readings>
+Covariance of_readings(const Tool& tool, const Readings& wrist) {
+  Covariance covariance = Covariance::Zero();
+  for (std::size_t k = 0; k < 2; ++k) {
+    const Motion motion = slope([&](double change) {
+      Readings moved = wrist;
+      moved[k] += change;
+      if (tool.snake_like) moved[moved.size() - 1 - k] += change;
+      return tip_in_marker(tool, moved).marker_from_tip;
+    });
+    covariance += std::pow(tool.wrist[k].sigma_reading_rad, 2) * motion * motion.transpose();
+  }
+  return covariance;
+}
+
 TEST(TipInMarker, CovarianceIsThatOfFiniteDifferences) {
   const Tool tool = placed_tool();
   Random random(1);
@@ -50,18 +66,9 @@ TEST(TipInMarker, CovarianceIsThatOfFiniteDifferences) {
     for (Eigen::Index k = 0; k < 6; ++k)
       by_place.col(k) = slope(
           [&](double change) { return tip_in_marker(with_changed_place(tool, k, change), wrist).marker_from_tip; });
-    Covariance readings = Covariance::Zero();
-    for (std::size_t k = 0; k < 2; ++k) {
-      const Motion motion = slope([&](double change) {
-        Wrist moved = wrist;
-        moved[k] += change;
-        return tip_in_marker(tool, moved).marker_from_tip;
-      });
-      readings += std::pow(tool.wrist[k].sigma_reading_rad, 2) * motion * motion.transpose();
-    }
     const TipInMarker tip = tip_in_marker(tool, wrist);
     EXPECT_TRUE(tip.of_place.isApprox(by_place * tool.place->covariance * by_place.transpose(), 1e-6)) << i;
-    EXPECT_TRUE(tip.of_readings.isApprox(readings, 1e-6)) << i;
+    EXPECT_TRUE(tip.of_readings.isApprox(of_readings(tool, wrist), 1e-6)) << i;
     EXPECT_TRUE(tip.covariance_m2.isApprox((tip.of_place + tip.of_readings).topLeftCorner<3, 3>(), 1e-12)) << i;
   }
 }
@@ -95,16 +102,7 @@ TEST(TipInMarker, OfASnakeHasTwoReadingsWhoseErrorsAreThoseOfTwoJointsEach) {
   tool.wrist = {tool.wrist[0], tool.wrist[1], tool.wrist[1], tool.wrist[0]};
   tool.snake_like = true;
   const std::array<double, 4> wrist{0.1, 0.2, 0.2, 0.1};
-  Covariance readings = Covariance::Zero();
-  for (const std::size_t k : {0U, 1U}) {
-    const Motion motion = slope([&](double change) {
-      auto moved = wrist;
-      moved[k] += change, moved[3 - k] += change;
-      return tip_in_marker(tool, moved).marker_from_tip;
-    });
-    readings += std::pow(tool.wrist[k].sigma_reading_rad, 2) * motion * motion.transpose();
-  }
-  EXPECT_TRUE(tip_in_marker(tool, wrist).of_readings.isApprox(readings, 1e-6));
+  EXPECT_TRUE(tip_in_marker(tool, wrist).of_readings.isApprox(of_readings(tool, wrist), 1e-6));
 }
 
 TEST(TipInMarker, RefusesReadingsThatAreNone) {
