@@ -128,6 +128,17 @@ inline Marker cut_by_hand(const Marker& nominal, std::uint64_t seed) {
   return shape.on(nominal);
 }
 
+// Each number's error over its sigma, but for the gap's.
+inline std::vector<double> errors_over_sigmas(const Marker& found, const Marker& truth) {
+  std::vector<double> all{(found.wrap_m - truth.wrap_m) / *found.sigmas.wrap_m,
+                          (found.skew_m - truth.skew_m) / *found.sigmas.skew_m};
+  for (std::size_t i = 0; i < 3; ++i) {
+    all.push_back((found.bands_upper_m[i] - truth.bands_upper_m[i]) / (*found.sigmas.bands_upper_m)[i]);
+    all.push_back((found.bands_lower_m[i] - truth.bands_lower_m[i]) / (*found.sigmas.bands_lower_m)[i]);
+  }
+  return all;
+}
+
 // Calibrates a rig by a turn there and back. The true marker may change in between.
 inline MarkerCalibration calibration_of_marker(const Recording& recording, const Rig& believed, const Marker& there,
                                                const Marker& back) {
@@ -152,6 +163,13 @@ inline MarkerCalibration calibration_of_marker(const Recording& recording, const
       },
       [&](const cv::Mat& bgr, double time_s) { frames.add(bgr, time_s); });
   return calibrate_marker(believed, 0, frames.take());
+}
+
+// As before a registration: the joints' names are known.
+inline Instrument names_alone(Instrument instrument) {
+  instrument.camera_from_rcm.reset(), instrument.image_delay_s.reset();
+  instrument.joints->sign = {1, 1, 1, 1}, instrument.joints->offset = {};
+  return instrument;
 }
 
 struct Swing {

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "acceptance/laboratory.h"
@@ -76,59 +77,60 @@ void add_q(const Observation::Rcm& seen, const JointVector& truth, Spread& sprea
     spread.add(static_cast<std::size_t>(i), error[i], std::sqrt(seen.covariance(i, i)));
 }
 
-Eigen::Vector3d normal_vector(Random& random) {
-  const double x = random.normal(), y = random.normal();
-  return {x, y, random.normal()};
+// Errors of the marker's pose: across and along the line of sight, of the axis and about it.
+Spread spread_of_pose() {
+  return Spread({"x y", "z", "axis", "roll"});
+}
+
+void add_pose(const Observation::MarkerPose& seen, const Rigid3& truth, Spread& spread) {
+  const Rigid3 error = truth.inverse() * seen.camera_from_marker;
+  const Eigen::Vector3d moved_m = seen.camera_from_marker.translation - truth.translation;
+  const Eigen::Vector3d axis = error.rotation * Eigen::Vector3d::UnitZ(), x = error.rotation * Eigen::Vector3d::UnitX();
+  spread.add(0, moved_m.head<2>().norm() / std::sqrt(2.0), seen.sigma_xy_m);
+  spread.add(1, moved_m.z(), seen.sigma_z_m);
+  spread.add(2, axis.head<2>().norm(), seen.sigma_axis_rad);
+  spread.add(3, std::atan2(x.y(), x.x()), seen.sigma_roll_rad);
 }
 
 struct Row {
   int frames = 0, told = 0;
-  Spread q = spread_of_q();
+  Spread q = spread_of_q(), pose = spread_of_pose();
 
-  void print(const std::string& name) const { q.print(name, told, frames); }
+  // An observation with its truth.
+  void add(const Observation& seen, const Instrument& truth, const JointVector& at) {
+    ++told;
+    if (seen.rcm) add_q(*seen.rcm, at, q);
+    add_pose(*seen.marker, camera_from_marker(truth.marker, *truth.camera_from_rcm, at), pose);
+  }
 };
 
 // Frames of rendered scenes of the rig, each tracked by itself with a rig that is drawn about it.
-Row tracked(const Rig& truth, const std::function<Rig(const Rig&, Random&)>& drawn) {
+Row tracked(const Rig& truth, const std::function<Rig(Rig, Random&)>& drawn) {
   Row row;
-  row.frames = static_cast<int>(from_environment("LAPSERVO_SIGMA_FRAMES", 40));
+  row.frames = from_environment("LAPSERVO_SIGMA_FRAMES", 40);
   const auto first = static_cast<std::uint64_t>(from_environment("LAPSERVO_SIGMA_SEED", 1));
   for (int i = 0; i < row.frames; ++i) {
     const std::uint64_t seed = first + static_cast<std::uint64_t>(i);
     Random random(seed);
     const JointVector q = scenes::random_configuration(truth, 0, random);
     const cv::Mat image = scenes::render(truth, {q}, seed);
-    const auto seen = Tracker(drawn(truth, random)).track(image);
-    if (seen[0].status != Status::ok || !seen[0].rcm) continue;
-    ++row.told;
-    add_q(*seen[0].rcm, q, row.q);
+    const Rig rig = drawn(truth, random);
+    const Observation seen = Tracker(rig).track(image)[0];
+    if (seen.status == Status::ok && seen.rcm.has_value() == rig.instruments[0].camera_from_rcm.has_value())
+      row.add(seen, truth.instruments[0], q);
   }
   return row;
-}
-
-// A registration that is known to so much, about each axis.
-Rig with_registration(Rig rig, double sigma_m, double sigma_rad, Random& random) {
-  Instrument& instrument = rig.instruments[0];
-  Rigid3& transform = *instrument.camera_from_rcm;
-  transform.translation += sigma_m * normal_vector(random);
-  transform.rotation = rotation_by(sigma_rad * normal_vector(random)) * transform.rotation;
-  instrument.registration_covariance.emplace();
-  instrument.registration_covariance->setZero();
-  instrument.registration_covariance->diagonal() << Eigen::Vector3d::Constant(sigma_m * sigma_m),
-      Eigen::Vector3d::Constant(sigma_rad * sigma_rad);
-  return rig;
 }
 
 TEST(RigSigmas, OfARegistrationAreInQ) {
   for (const auto& [sigma_mm, sigma_mrad] :
        {std::pair(0.3, 1.0), std::pair(1.0, 5.0), std::pair(3.0, 20.0), std::pair(10.0, 50.0)}) {
-    const Row row = tracked(testing::paper_test_rig(),
-                            [sigma_m = 1e-3 * sigma_mm, sigma_rad = 1e-3 * sigma_mrad](const Rig& rig, Random& random) {
-                              return with_registration(rig, sigma_m, sigma_rad, random);
-                            });
-    char name[64];
-    std::snprintf(name, sizeof name, "registration to %.1f mm, %.0f mrad", sigma_mm, sigma_mrad);
-    row.print(name);
+    const Row row = tracked(testing::paper_test_rig(), [mm = sigma_mm, mrad = sigma_mrad](Rig rig, Random& random) {
+      scenes::misregister(rig.instruments[0], 1e-3 * mm, 1e-3 * mrad, random);
+      return rig;
+    });
+    const std::string name = fmt::format("registration to {:.1f} mm, {:.0f} mrad", sigma_mm, sigma_mrad);
+    row.q.print(name, row.told, row.frames);
     EXPECT_GE(row.told, 0.95 * row.frames) << name;
     row.q.expect(0.7, 1.3);
   }
@@ -151,25 +153,10 @@ TEST(RigSigmas, OfAPrintAreInPsi) {
   constexpr double sigma_m = 0.01e-3;
   const Row row = tracked(testing::paper_test_rig(),
                           [&](const Rig& rig, Random& random) { return with_print(rig, sigma_m, random); });
-  row.print("print to 0.01 mm");
+  row.q.print("print to 0.01 mm", row.told, row.frames);
   EXPECT_GE(row.told, 0.95 * row.frames);
   EXPECT_GT(row.q.of(3), 0.7);
   EXPECT_LT(row.q.of(3), 1.3);
-}
-
-// Errors of the marker's pose: across and along the line of sight, of the axis and about it.
-Spread spread_of_pose() {
-  return Spread({"x y", "z", "axis", "roll"});
-}
-
-void add_pose(const Observation::MarkerPose& seen, const Rigid3& truth, Spread& spread) {
-  const Rigid3 error = truth.inverse() * seen.camera_from_marker;
-  const Eigen::Vector3d moved_m = seen.camera_from_marker.translation - truth.translation;
-  const Eigen::Vector3d axis = error.rotation * Eigen::Vector3d::UnitZ(), x = error.rotation * Eigen::Vector3d::UnitX();
-  spread.add(0, moved_m.head<2>().norm() / std::sqrt(2.0), seen.sigma_xy_m);
-  spread.add(1, moved_m.z(), seen.sigma_z_m);
-  spread.add(2, axis.head<2>().norm(), seen.sigma_axis_rad);
-  spread.add(3, std::atan2(x.y(), x.x()), seen.sigma_roll_rad);
 }
 
 // A camera whose focal lengths, each by itself, are known to a part, and whose response to so much of its values.
@@ -190,35 +177,23 @@ TEST(RigSigmas, OfACameraAreInThePose) {
   truth.camera.response = {Response::Kind::power, 2.2};
   for (const auto& [sigma_focal, sigma_response] :
        {std::pair(5e-3, 0.0), std::pair(0.0, 0.02), std::pair(5e-3, 0.02)}) {
-    Spread spread = spread_of_pose();
-    const int frames = from_environment("LAPSERVO_SIGMA_FRAMES", 40);
-    int told = 0;
-    for (int i = 0; i < frames; ++i) {
-      const auto seed = static_cast<std::uint64_t>(from_environment("LAPSERVO_SIGMA_SEED", 1) + i);
-      Random random(seed);
-      const JointVector q = scenes::random_configuration(truth, 0, random);
-      const cv::Mat image = scenes::render(truth, {q}, seed);
-      Rig rig = with_camera(truth, sigma_focal, sigma_response, random);
-      rig.instruments[0].camera_from_rcm.reset();
-      const auto seen = Tracker(rig).track(image);
-      if (seen[0].status != Status::ok) continue;
-      ++told;
-      const Instrument& instrument = truth.instruments[0];
-      const ShaftPose pose = pose_through_rcm(*instrument.camera_from_rcm, q);
-      add_pose(*seen[0].marker, camera_from_marker(instrument.marker, pose.camera_from_unrolled, pose.psi_rad), spread);
-    }
-    char name[64];
-    std::snprintf(name, sizeof name, "focal length to %.1f %%, response %.2f", 100 * sigma_focal, sigma_response);
-    spread.print(name, told, frames);
+    const Row row = tracked(truth, [focal = sigma_focal, response = sigma_response](const Rig& rig, Random& random) {
+      Rig drawn = with_camera(rig, focal, response, random);
+      drawn.instruments[0].camera_from_rcm.reset();
+      return drawn;
+    });
+    const std::string name =
+        fmt::format("focal length to {:.1f} %, response {:.2f}", 100 * sigma_focal, sigma_response);
+    row.pose.print(name, row.told, row.frames);
     // Pixels that are not square contradict a print.
-    EXPECT_GE(told, 0.8 * frames) << name;
-    spread.expect(0.6, 1.4);
+    EXPECT_GE(row.told, 0.8 * row.frames) << name;
+    row.pose.expect(0.6, 1.4);
   }
 }
 
 // A laboratory that calibrates its camera, its handmade marker and its arm, and tracks ten frames more by what that
 // wrote.
-void track_by_calibrations(std::uint64_t seed, Row& row, Spread& pose) {
+void track_by_calibrations(std::uint64_t seed, Row& row) {
   SCOPED_TRACE(seed);
   constexpr int frames = 10;
   const laboratories::Recording recording{seed, seed % 2 != 0 ? 1.0 : 4.0, seed % 3 == 2};
@@ -232,9 +207,7 @@ void track_by_calibrations(std::uint64_t seed, Row& row, Spread& pose) {
   rig.instruments[0].marker = print.marker;
   const laboratories::Swing swung = laboratories::swing(recording, true_rig, rig);
   const Instrument& truth = swung.truth.instruments[0];
-  Instrument named = rig.instruments[0];
-  named.camera_from_rcm.reset(), named.image_delay_s.reset();
-  named.joints->sign = {1, 1, 1, 1}, named.joints->offset = {};
+  const Instrument named = laboratories::names_alone(rig.instruments[0]);
   const Registration found = register_arm(named, swung.poses, swung.joints, "joints");
   ASSERT_EQ(found.refusal, "");
   rig.instruments[0] = registered(named, found);
@@ -245,28 +218,23 @@ void track_by_calibrations(std::uint64_t seed, Row& row, Spread& pose) {
     const auto noise = 1000 * seed + 500 + static_cast<std::uint64_t>(i);
     const Observation seen = Tracker(rig).track(renderer.render({placement_of(truth, q)}, noise))[0];
     ++row.frames;
-    if (seen.status != Status::ok || !seen.rcm) continue;
-    ++row.told;
-    add_q(*seen.rcm, q, row.q);
-    const ShaftPose at = pose_through_rcm(*truth.camera_from_rcm, q);
-    add_pose(*seen.marker, camera_from_marker(truth.marker, at.camera_from_unrolled, at.psi_rad), pose);
+    if (seen.status == Status::ok && seen.rcm) row.add(seen, truth, q);
   }
 }
 
 // LAPSERVO_SIGMA_LABORATORIES of them (1).
 TEST(RigSigmas, OfALaboratorysOwnCalibrationsAreInQ) {
   Row row;
-  Spread pose = spread_of_pose();
   const int laboratories = from_environment("LAPSERVO_SIGMA_LABORATORIES", 1);
   for (int i = 0; i < laboratories; ++i)
-    track_by_calibrations(static_cast<std::uint64_t>(from_environment("LAPSERVO_SIGMA_SEED", 1) + i), row, pose);
+    track_by_calibrations(static_cast<std::uint64_t>(from_environment("LAPSERVO_SIGMA_SEED", 1) + i), row);
   const std::string name = "laboratories: " + std::to_string(laboratories);
-  row.print(name + ", q"), pose.print(name + ", marker", row.told, row.frames);
+  row.q.print(name + ", q", row.told, row.frames), row.pose.print(name + ", marker", row.told, row.frames);
   EXPECT_GE(row.told, 0.95 * row.frames);
   EXPECT_LT(row.q.worst(), 4.5);
-  EXPECT_LT(pose.worst(), 4.5);
+  EXPECT_LT(row.pose.worst(), 4.5);
   row.q.expect(0.2, 1.4);
-  pose.expect(0.2, 1.4);
+  row.pose.expect(0.2, 1.4);
 }
 
 }  // namespace

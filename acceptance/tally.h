@@ -40,7 +40,7 @@ struct Tally {
   void show(const std::string& name) const {
     std::printf("%s: %d frames", name.c_str(), frames);
     for (const auto& [status, count] : statuses) std::printf(", %d %s", count, status.c_str());
-    std::printf("; psi rms %.1f mrad, largest %.1f mrad, error / sigma %.2f, %d wrong\n", 1e3 * rms(errors_rad),
+    std::printf("; psi rms %.2f mrad, largest %.1f mrad, error / sigma %.2f, %d wrong\n", 1e3 * rms(errors_rad),
                 1e3 * largest(errors_rad), rms(errors_sigmas), wrong);
     std::fflush(stdout);
   }

@@ -14,7 +14,6 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/core/random.h"
-#include "lapservo/geometry/rotation.h"
 #include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/renderer.h"
 #include "lapservo/sim/tissue.h"
@@ -27,19 +26,9 @@ namespace {
 
 constexpr double degree = std::numbers::pi / 180;
 
-Eigen::Vector3d normal3(Random& random) {
-  return {random.normal(), random.normal(), random.normal()};
-}
-
-// Off by 1 mm and 5 mrad rms, and saying so.
+// By 1 mm and 5 mrad rms.
 void misregister(Instrument& instrument, Random& random) {
-  const double sigma_m = 1e-3 / std::sqrt(3), sigma_rad = 5e-3 / std::sqrt(3);
-  Rigid3& pose = *instrument.camera_from_rcm;
-  pose.translation += sigma_m * normal3(random);
-  pose.rotation = (rotation_by(sigma_rad * normal3(random)) * pose.rotation).normalized();
-  instrument.registration_covariance.emplace().setZero();
-  instrument.registration_covariance->diagonal() << Eigen::Vector3d::Constant(sigma_m * sigma_m),
-      Eigen::Vector3d::Constant(sigma_rad * sigma_rad);
+  scenes::misregister(instrument, 1e-3 / std::sqrt(3), 5e-3 / std::sqrt(3), random);
 }
 
 // Where the marker's frame is, without lapservo's kinematics: Rz(theta) Ry(phi) Rz(psi + seam), rho along z.
@@ -139,7 +128,7 @@ TEST(Tip, OfAWristIsOffAsItsCovarianceSays) {
     Tool::Place& said = tool.place.emplace();
     said.covariance.diagonal().head<4>() << 2.5e-9, 2.5e-9, 1e-8, 1e-4;
     said.base_in_marker_m =
-        Eigen::Vector3d(0, 0, base_m) + Eigen::Vector3d(5e-5, 5e-5, 1e-4).cwiseProduct(normal3(random));
+        Eigen::Vector3d(0, 0, base_m) + Eigen::Vector3d(5e-5, 5e-5, 1e-4).cwiseProduct(scenes::normal_vector(random));
     said.azimuth_rad = azimuth_rad + 0.01 * random.normal();
     const std::array<double, 2> read{joints[0] + degree * random.normal(), joints[1] + degree * random.normal()};
     const JointVector q = scenes::random_configuration(truth, 0, random);

@@ -88,6 +88,19 @@ ShaftPose pose_of(const Rig& rig, std::size_t i, const JointVector& q) {
   return {*rig.instruments[i].camera_from_rcm * rcm_from_unrolled(q), q.psi_rad};
 }
 
+Eigen::Vector3d normal_vector(Random& random) {
+  return {random.normal(), random.normal(), random.normal()};  // braces: in this order
+}
+
+void misregister(Instrument& instrument, double sigma_m, double sigma_rad, Random& random) {
+  Rigid3& pose = *instrument.camera_from_rcm;
+  pose.translation += sigma_m * normal_vector(random);
+  pose.rotation = rotation_by(sigma_rad * normal_vector(random)) * pose.rotation;
+  instrument.registration_covariance.emplace().setZero();
+  instrument.registration_covariance->diagonal() << Eigen::Vector3d::Constant(sigma_m * sigma_m),
+      Eigen::Vector3d::Constant(sigma_rad * sigma_rad);
+}
+
 namespace {
 
 // Distance of the first shaft's axis from the second one's, as lines.

@@ -30,6 +30,12 @@ JointVector random_configuration(const Rig& rig, std::size_t instrument, Random&
 
 ShaftPose pose_of(const Rig& rig, std::size_t instrument, const JointVector& q);
 
+/// Three independent standard normal numbers.
+Eigen::Vector3d normal_vector(Random& random);
+
+/// Puts the registration off, by these standard deviations along and about each axis, which it states.
+void misregister(Instrument& instrument, double sigma_m, double sigma_rad, Random& random);
+
 /// Two instruments whose markers touch or cross in the image, one before the other: their middles less than 110 px
 /// apart there, their axes a diameter and more apart in space.
 struct CrossingPair {
