@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <map>
 #include <numeric>
 #include <stdexcept>
@@ -75,9 +76,7 @@ void Score::add(const TrueFrame& frame, const std::vector<Observation>& observat
   }
 }
 
-std::optional<fs::path> sample_folder() {
-  return lapservo::testing::sample_frames();
-}
+namespace {
 
 std::vector<TrueFrame> frames_in(const fs::path& folder) {
   const CsvTable table = CsvTable::read(folder / "truth.csv");
@@ -105,8 +104,10 @@ std::vector<TrueFrame> frames_in(const fs::path& folder) {
   return frames;
 }
 
+}  // namespace
+
 std::vector<TrueFrame> sample_frames(const std::string& set) {
-  return frames_in(sample_folder().value() / set);
+  return frames_in(lapservo::testing::sample_frames(set).value());
 }
 
 std::vector<TrueFrame> stored_frames(const std::string& set) {

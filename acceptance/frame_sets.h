@@ -1,10 +1,8 @@
 #pragma once
 
 #include <array>
-#include <filesystem>
 #include <functional>
 #include <map>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -55,13 +53,8 @@ double mean(const std::vector<double>& values);
 double standard_deviation(const std::vector<double>& values);
 double largest(const std::vector<double>& values);
 
-/// The folder of ray-traced samples, when it is there: LAPSERVO_FRAMES or ../shared/frames.
-std::optional<std::filesystem::path> sample_folder();
-
-/// The frames of a folder with truth.csv, in order. A frame's rig is NNNN.rig.yaml or rig.yaml.
-std::vector<TrueFrame> frames_in(const std::filesystem::path& folder);
-
-/// Those of one of the samples' sets.
+/// The frames of one of the samples' sets: of a folder with truth.csv, in order. A frame's rig is NNNN.rig.yaml or
+/// rig.yaml.
 std::vector<TrueFrame> sample_frames(const std::string& set);
 
 /// Those of a set under acceptance/frames, which are in this repository.

@@ -3,6 +3,7 @@
 
 #include "bench/accuracy_study.h"
 #include "lapservo/core/statistics.h"
+#include "lapservo/testing/sample_frames.h"
 #include "lapservo/testing/scenes.h"
 #include "lapservo/vision/model/fine_fit.h"
 
@@ -69,7 +70,7 @@ void print_edge_errors(int frames, std::uint64_t seed) {
       "noise | lag-1 |");
   std::puts("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |");
   for (const char* name : {"still", "5mm", "3mm", "soft_dim"}) print_errors(name, motion_frames(name, frames, seed));
-  if (sample_folder())
+  if (testing::sample_frames())
     for (const char* set : {"rotation", "illumination"})
       print_errors(std::string("samples, ") + set, sample_frames(set));
 }
