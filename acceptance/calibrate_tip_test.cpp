@@ -37,11 +37,7 @@ const Eigen::Vector3d point_m(0.02, -0.02, 0.125);  // camera frame: the dimple,
 const Eigen::Vector3d usual_axis(0.65, -0.5, 0.57);
 
 std::vector<std::uint64_t> seeds() {
-  const int count = testing::from_environment("LAPSERVO_TIP_RECORDINGS", 1),
-            first = testing::from_environment("LAPSERVO_TIP_SEED", 1);
-  std::vector<std::uint64_t> all;
-  for (int seed = first; seed < first + count; ++seed) all.push_back(static_cast<std::uint64_t>(seed));
-  return all;
+  return testing::seeds_from_environment("LAPSERVO_TIP_RECORDINGS", "LAPSERVO_TIP_SEED");
 }
 
 // Straight, or a wrist with joints like dVRK's needle drivers, somewhere behind the marker.

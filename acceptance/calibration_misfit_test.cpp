@@ -35,8 +35,6 @@ using namespace internal;
 using namespace laboratories;
 namespace {
 
-using testing::from_environment;
-
 constexpr double wrong_sigmas = 4;
 
 // An answer of a calibration: a refusal, or errors in its own sigmas and the faults that it names.
@@ -86,11 +84,9 @@ class Answers {
 };
 
 std::vector<Recording> recordings() {
-  const int count = from_environment("LAPSERVO_MISFIT_RECORDINGS", 1),
-            first = from_environment("LAPSERVO_MISFIT_SEED", 1);
   std::vector<Recording> all;
-  for (int seed = first; seed < first + count; ++seed)
-    all.push_back({static_cast<std::uint64_t>(seed), seed % 2 != 0 ? 1.0 : 4.0, seed % 3 == 2});
+  for (const std::uint64_t seed : testing::seeds_from_environment("LAPSERVO_MISFIT_RECORDINGS", "LAPSERVO_MISFIT_SEED"))
+    all.push_back(usual_recording(seed));
   return all;
 }
 

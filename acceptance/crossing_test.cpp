@@ -48,13 +48,6 @@ struct PairTally : Tally {
   }
 };
 
-void print_head() {
-  std::printf(
-      "| | markers | detected | with observable psi | detected | psi rms [mrad] | largest | normalised error | wrong "
-      "|\n"
-      "| --- | --- | --- | --- | --- | --- | --- | --- | --- |\n");
-}
-
 // Patches of all colours, the markers' among them, instead of tissue.
 cv::Mat make_colourful(cv::Size size, Random& random) {
   cv::Mat light(size, CV_32FC3, cv::Scalar(0.1, 0.1, 0.15));
@@ -223,7 +216,9 @@ class Crossing : public ::testing::Test {
   Sums looked_at_all(bool moving) const {
     Sums sums;
     int number = 0;
-    print_head();
+    std::puts(
+        "| | markers | detected | with observable psi | detected | psi rms [mrad] | largest | error / sigma | wrong |\n"
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- |");
     for (const Kind& kind : kinds()) {
       const Tallies tallies = looked_at(kind, ++number, moving);
       tallies.front.print(kind.name + ": nothing before it"), tallies.behind.print("behind the other");

@@ -38,6 +38,10 @@ struct Recording {
   bool compressed;
 };
 
+inline Recording usual_recording(std::uint64_t seed) {
+  return {seed, seed % 2 != 0 ? 1.0 : 4.0, seed % 3 == 2};
+}
+
 struct UsualCamera {
   int width_px, height_px;
   double focal_px, k1;

@@ -30,7 +30,7 @@ namespace lapservo::acceptance {
 using namespace internal;
 namespace {
 
-using testing::from_environment;
+using testing::seeds_from_environment;
 
 // Sums of squared errors over variances, by quantity.
 class Spread {
@@ -66,51 +66,36 @@ class Spread {
   std::vector<std::vector<double>> squares_;
 };
 
-Spread spread_of_q() {
-  return Spread({"theta", "phi", "rho", "psi"});
-}
-
-void add_q(const Observation::Rcm& seen, const JointVector& truth, Spread& spread) {
-  Eigen::Vector4d error = seen.q.vector() - truth.vector();
-  for (const Eigen::Index angle : {0, 1, 3}) error[angle] = wrap_pi(error[angle]);
-  for (Eigen::Index i = 0; i < 4; ++i)
-    spread.add(static_cast<std::size_t>(i), error[i], std::sqrt(seen.covariance(i, i)));
-}
-
-// Errors of the marker's pose: across and along the line of sight, of the axis and about it.
-Spread spread_of_pose() {
-  return Spread({"x y", "z", "axis", "roll"});
-}
-
-void add_pose(const Observation::MarkerPose& seen, const Rigid3& truth, Spread& spread) {
-  const Rigid3 error = truth.inverse() * seen.camera_from_marker;
-  const Eigen::Vector3d moved_m = seen.camera_from_marker.translation - truth.translation;
-  const Eigen::Vector3d axis = error.rotation * Eigen::Vector3d::UnitZ(), x = error.rotation * Eigen::Vector3d::UnitX();
-  spread.add(0, moved_m.head<2>().norm() / std::sqrt(2.0), seen.sigma_xy_m);
-  spread.add(1, moved_m.z(), seen.sigma_z_m);
-  spread.add(2, axis.head<2>().norm(), seen.sigma_axis_rad);
-  spread.add(3, std::atan2(x.y(), x.x()), seen.sigma_roll_rad);
-}
-
+// Errors of q, and of the marker's pose: across and along the line of sight, of the axis and about it.
 struct Row {
   int frames = 0, told = 0;
-  Spread q = spread_of_q(), pose = spread_of_pose();
+  Spread q{{"theta", "phi", "rho", "psi"}}, pose{{"x y", "z", "axis", "roll"}};
 
-  // An observation with its truth.
-  void add(const Observation& seen, const Instrument& truth, const JointVector& at) {
+  void add(const Observation& seen, const Instrument& truth, const JointVector& true_q) {
     ++told;
-    if (seen.rcm) add_q(*seen.rcm, at, q);
-    add_pose(*seen.marker, camera_from_marker(truth.marker, *truth.camera_from_rcm, at), pose);
+    if (seen.rcm) {
+      Eigen::Vector4d error = seen.rcm->q.vector() - true_q.vector();
+      for (const Eigen::Index angle : {0, 1, 3}) error[angle] = wrap_pi(error[angle]);
+      for (Eigen::Index i = 0; i < 4; ++i)
+        q.add(static_cast<std::size_t>(i), error[i], std::sqrt(seen.rcm->covariance(i, i)));
+    }
+    const Observation::MarkerPose& marker = seen.marker.value();
+    const Rigid3 expected = camera_from_marker(truth.marker, *truth.camera_from_rcm, true_q);
+    const Eigen::Matrix3d turn =
+        (expected.rotation.conjugate() * marker.camera_from_marker.rotation).toRotationMatrix();
+    const Eigen::Vector3d moved_m = marker.camera_from_marker.translation - expected.translation;
+    pose.add(0, moved_m.head<2>().norm() / std::sqrt(2.0), marker.sigma_xy_m);
+    pose.add(1, moved_m.z(), marker.sigma_z_m);
+    pose.add(2, turn.col(2).head<2>().norm(), marker.sigma_axis_rad);
+    pose.add(3, std::atan2(turn(1, 0), turn(0, 0)), marker.sigma_roll_rad);
   }
 };
 
 // Frames of rendered scenes of the rig, each tracked by itself with a rig that is drawn about it.
 Row tracked(const Rig& truth, const std::function<Rig(Rig, Random&)>& drawn) {
   Row row;
-  row.frames = from_environment("LAPSERVO_SIGMA_FRAMES", 40);
-  const auto first = static_cast<std::uint64_t>(from_environment("LAPSERVO_SIGMA_SEED", 1));
-  for (int i = 0; i < row.frames; ++i) {
-    const std::uint64_t seed = first + static_cast<std::uint64_t>(i);
+  for (const std::uint64_t seed : seeds_from_environment("LAPSERVO_SIGMA_FRAMES", "LAPSERVO_SIGMA_SEED", 40)) {
+    ++row.frames;
     Random random(seed);
     const JointVector q = scenes::random_configuration(truth, 0, random);
     const cv::Mat image = scenes::render(truth, {q}, seed);
@@ -196,7 +181,7 @@ TEST(RigSigmas, OfACameraAreInThePose) {
 void track_by_calibrations(std::uint64_t seed, Row& row) {
   SCOPED_TRACE(seed);
   constexpr int frames = 10;
-  const laboratories::Recording recording{seed, seed % 2 != 0 ? 1.0 : 4.0, seed % 3 == 2};
+  const laboratories::Recording recording = laboratories::usual_recording(seed);
   Rig rig = laboratories::laboratory(seed), true_rig = rig;
   Marker& marker = true_rig.instruments[0].marker = laboratories::cut_by_hand(rig.instruments[0].marker, seed);
   const CameraCalibration camera = laboratories::calibration_of_camera(recording);
@@ -225,11 +210,9 @@ void track_by_calibrations(std::uint64_t seed, Row& row) {
 // LAPSERVO_SIGMA_LABORATORIES of them (1).
 TEST(RigSigmas, OfALaboratorysOwnCalibrationsAreInQ) {
   Row row;
-  const int laboratories = from_environment("LAPSERVO_SIGMA_LABORATORIES", 1);
-  for (int i = 0; i < laboratories; ++i)
-    track_by_calibrations(static_cast<std::uint64_t>(from_environment("LAPSERVO_SIGMA_SEED", 1) + i), row);
-  const std::string name = "laboratories: " + std::to_string(laboratories);
-  row.q.print(name + ", q", row.told, row.frames), row.pose.print(name + ", marker", row.told, row.frames);
+  for (const std::uint64_t seed : seeds_from_environment("LAPSERVO_SIGMA_LABORATORIES", "LAPSERVO_SIGMA_SEED"))
+    track_by_calibrations(seed, row);
+  row.q.print("laboratories, q", row.told, row.frames), row.pose.print("laboratories, marker", row.told, row.frames);
   EXPECT_GE(row.told, 0.95 * row.frames);
   EXPECT_LT(row.q.worst(), 4.5);
   EXPECT_LT(row.pose.worst(), 4.5);

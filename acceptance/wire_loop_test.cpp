@@ -11,7 +11,6 @@
 #include <cstdlib>
 #include <filesystem>
 #include <functional>
-#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -275,18 +274,6 @@ class WireLoop : public ::testing::TestWithParam<std::string> {
     loop_->signal(signal);
     loop_->wait();
   }
-  // Held as soon as nobody presses any more, and when it is pressed again.
-  void expect_to_move_only_while_pressed(const std::function<void()>& press, const std::function<void()>& release) {
-    ASSERT_TRUE(moves(300, press));
-    const double released_s = since_1970_s();
-    release();
-    expect_soon_said("hold: operator_absent", said().rfind("track"));
-    sleep(1);
-    EXPECT_FALSE(spy_->moves_after(released_s + allowed_s + rest_s));
-    const std::size_t held = spy_->count();
-    for (int i = 0; i < 100; ++i) press(), sleep(0.01);
-    EXPECT_EQ(spy_->count(), held);
-  }
   // Where servo says that its page is; 0 when it does not say it.
   int page_port() const {
     const std::string before = "page: http://127.0.0.1:";
@@ -372,14 +359,12 @@ TEST_P(WireLoop, TrackPublishesFrames) {
                             GetParam(), file("rig.yaml"), file("seen.csv"), GetParam()),
                 file("track.txt"));
   const std::string msg = GetParam() == "ros2" ? "/msg/" : "/";
-  const std::map<std::string, std::string> expected{
-      {"/tf", "tf2_msgs" + msg + "TFMessage"},
-      {"/tf_static", "tf2_msgs" + msg + "TFMessage"},
-      {"/lapservo/PSM1/pose", "geometry_msgs" + msg + "PoseWithCovarianceStamped"},
-      {"/lapservo/PSM1/markers", "visualization_msgs" + msg + "MarkerArray"}};
-  for (const auto& [topic, type] : expected) {
+  for (const auto& [topic, package, type] : {std::array<std::string, 3>{"/tf", "tf2_msgs", "TFMessage"},
+                                             {"/tf_static", "tf2_msgs", "TFMessage"},
+                                             {"/lapservo/PSM1/pose", "geometry_msgs", "PoseWithCovarianceStamped"},
+                                             {"/lapservo/PSM1/markers", "visualization_msgs", "MarkerArray"}}) {
     wait_for([&, name = topic] { return ears_->published().contains(name); });
-    EXPECT_EQ(ears_->published()[topic], type) << said("track.txt");
+    EXPECT_EQ(ears_->published()[topic], package + msg + type) << said("track.txt");
   }
   track.signal(SIGINT);
   EXPECT_EQ(track.wait(), 0) << said("track.txt");
@@ -572,7 +557,15 @@ TEST_P(WireLoop, MovesOnlyWhileTheOperatorPressesAPedalOfEitherType) {
     begin("--operator-present " + topic);
     expect_soon_said("hold: operator_absent");
     EXPECT_EQ(spy_->count(), 0u);
-    expect_to_move_only_while_pressed(press, [&] { set(false); });
+    ASSERT_TRUE(moves(300, press));
+    const double released_s = since_1970_s();
+    set(false);
+    expect_soon_said("hold: operator_absent", said().rfind("track"));
+    sleep(1);
+    EXPECT_FALSE(spy_->moves_after(released_s + allowed_s + rest_s));
+    const std::size_t held = spy_->count();
+    for (int i = 0; i < 100; ++i) press(), sleep(0.01);
+    EXPECT_EQ(spy_->count(), held) << "pressed again, it waits for a start";
     ASSERT_TRUE(moves(100, [&] { press(), start(); }));
     end();
     spy_->expect_no_jump();
