@@ -209,12 +209,6 @@ TEST(CalibrationMisfit, Alignment) {
 
 // --- camera
 
-struct BoardDeparture {
-  std::string name, cause;
-  std::function<Camera(std::size_t, Camera)> camera = [](std::size_t, Camera c) { return c; };
-  std::function<cv::Mat(std::size_t, const cv::Mat&)> image = [](std::size_t, const cv::Mat& bgr) { return bgr; };
-};
-
 std::vector<BoardDeparture> board_departures() {
   std::vector<BoardDeparture> all;
   const auto zoomed = [](double by) {
@@ -225,30 +219,28 @@ std::vector<BoardDeparture> board_departures() {
   };
   for (const double by : {0.2, 0.05, 0.01, 0.003})
     all.push_back({"half of the views zoomed by " + std::to_string(by).substr(0, 5), "focal length", zoomed(by)});
-  BoardDeparture turned{"every second image turned", "principal point"};
-  turned.image = [](std::size_t i, const cv::Mat& bgr) {
+  all.push_back({"every second image turned", "principal point"});
+  all.back().image = [](std::size_t i, const cv::Mat& bgr) {
     cv::Mat upside_down = bgr;
     if (i % 2 != 0) cv::rotate(bgr, upside_down, cv::ROTATE_180);
     return upside_down;
   };
-  all.push_back(turned);
   for (const double px : {10.0, 1.0}) {
-    BoardDeparture rolling{"a rolling shutter, " + std::to_string(px).substr(0, 4) + " px", "shutter"};
-    rolling.image = [=](std::size_t i, const cv::Mat& bgr) {
+    all.push_back({"a rolling shutter, " + std::to_string(px).substr(0, 4) + " px", "shutter"});
+    all.back().image = [=](std::size_t i, const cv::Mat& bgr) {
       cv::Mat sheared;
       const double part = (i % 3 == 0 ? 1 : i % 3 == 1 ? -1 : 0.5) * px / bgr.rows;
       cv::warpAffine(bgr, sheared, cv::Matx23d(1, part, -part * bgr.rows / 2, 0, 1, 0), bgr.size(), cv::INTER_CUBIC,
                      cv::BORDER_REPLICATE);
       return sheared;
     };
-    all.push_back(rolling);
   }
   return all;
 }
 
 Answer camera_of(const Recording& recording, const BoardDeparture& departure) {
   const Camera truth = laboratory(recording.seed).camera;
-  const CameraCalibration found = calibration_of_camera(recording, departure.camera, departure.image);
+  const CameraCalibration found = calibration_of_camera(recording, departure);
   if (!found.refusal.empty()) return {found.refusal, {}};
   const Camera& camera = found.camera;
   const CameraSigmas& sigmas = found.sigmas;

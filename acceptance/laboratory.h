@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <functional>
+#include <string>
 #include <vector>
 
 #include <opencv2/core.hpp>
@@ -102,12 +103,15 @@ inline void show(int count, double fps, bool compressed, const std::function<cv:
   while (const auto frame = source->next()) look(frame->bgr, frame->time_s);
 }
 
-// Calibrates by twelve images of a board. The camera may differ from image to image, and an image may be changed.
-inline CameraCalibration calibration_of_camera(
-    const Recording& recording,
-    const std::function<Camera(std::size_t, Camera)>& camera = [](std::size_t, Camera c) { return c; },
-    const std::function<cv::Mat(std::size_t, const cv::Mat&)>& image = [](std::size_t,
-                                                                          const cv::Mat& bgr) { return bgr; }) {
+// Images of a board whose camera differs from image to image, or that are changed.
+struct BoardDeparture {
+  std::string name, cause;
+  std::function<Camera(std::size_t, Camera)> camera = [](std::size_t, Camera c) { return c; };
+  std::function<cv::Mat(std::size_t, const cv::Mat&)> image = [](std::size_t, const cv::Mat& bgr) { return bgr; };
+};
+
+// Calibrates by twelve images of a board.
+inline CameraCalibration calibration_of_camera(const Recording& recording, const BoardDeparture& departure = {}) {
   constexpr int views = 12;
   const Board board{9, 6, 0.005};
   const Camera truth = laboratory(recording.seed).camera;
@@ -116,7 +120,8 @@ inline CameraCalibration calibration_of_camera(
   BoardViews shown(board, views);
   const auto poses = board_poses(scene, truth, views, 100 * recording.seed);
   for (std::size_t i = 0; i < poses.size(); ++i)
-    shown.add(std::to_string(i), image(i, render_board(scene, camera(i, truth), poses[i], 1000 * recording.seed + i)),
+    shown.add(std::to_string(i),
+              departure.image(i, render_board(scene, departure.camera(i, truth), poses[i], 1000 * recording.seed + i)),
               true);
   return calibrate_camera(board, shown.take(), {});
 }

@@ -18,16 +18,14 @@ namespace lapservo {
 namespace {
 namespace fs = std::filesystem;
 
-// Without blanks and backticks at its ends.
-std::string bare(const std::string& cell) {
-  const auto first = cell.find_first_not_of(" `"), last = cell.find_last_not_of(" `");
-  return first == std::string::npos ? "" : cell.substr(first, last - first + 1);
-}
-
+// Without blanks and backticks at their ends.
 std::vector<std::string> cells(const std::string& line) {
   std::vector<std::string> found;
   std::istringstream rest(line.substr(1));
-  for (std::string cell; std::getline(rest, cell, '|');) found.push_back(bare(cell));
+  for (std::string cell; std::getline(rest, cell, '|');) {
+    const auto first = cell.find_first_not_of(" `"), last = cell.find_last_not_of(" `");
+    found.push_back(first == std::string::npos ? "" : cell.substr(first, last - first + 1));
+  }
   return found;
 }
 

@@ -4,7 +4,6 @@
 
 #include <array>
 #include <cstdint>
-#include <map>
 #include <string>
 #include <vector>
 
@@ -89,14 +88,8 @@ class Prints : public ::testing::Test {
 
 TEST_F(Prints, ThatAreOffAreNotTrusted) {
   Tally all;
-  std::map<int, Tally> by_error;
-  for (int i = 0; i < prints; ++i) {
-    const Print print = random_print(nominal, random_error_m(), false, random);
-    const Tally tally = seen(print.marker, rig, i, false);
-    all.add(tally), by_error[static_cast<int>(print.error_m / (0.05 * mm))].add(tally);
-  }
-  for (const auto& [error, tally] : by_error)
-    tally.show("bands off by " + std::to_string(error * 5) + " to " + std::to_string(error * 5 + 5) + " / 100 mm");
+  for (int i = 0; i < prints; ++i)
+    all.add(seen(random_print(nominal, random_error_m(), false, random).marker, rig, i, false));
   all.show("all");
   EXPECT_EQ(all.wrong, 0);
   EXPECT_LE(rms(all.errors_sigmas), 2);

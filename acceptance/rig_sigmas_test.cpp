@@ -19,7 +19,6 @@
 #include "lapservo/calibration/registration/registration_measurement.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/core/random.h"
-#include "lapservo/geometry/rotation.h"
 #include "lapservo/sim/renderer.h"
 #include "lapservo/testing/environment.h"
 #include "lapservo/testing/rigs.h"
