@@ -97,8 +97,7 @@ std::function<void()> in_joints(std::function<std::array<double, 5>(std::array<d
       std::array<double, 5> values{};
       for (std::size_t i = 0; i < 5; ++i) values[i] = table.number(row, columns[i]);
       values = change(values);
-      for (std::size_t i = 0; i < 5; ++i) text += (i > 0 ? "," : "") + std::to_string(values[i]);
-      text += "\n";
+      for (std::size_t i = 0; i < 5; ++i) text += std::to_string(values[i]) + (i < 4 ? "," : "\n");
     }
     rewrite("swing_joints.csv", text);
   };
@@ -172,21 +171,15 @@ std::vector<Mistake> mistakes() {
        {check},
        {"px wide", "come nearer"}},
       {"joints in degrees",
-       in_joints([](auto v) {
-         return std::array{v[0], v[1] * degrees, v[2] * degrees, v[3], v[4] * degrees};
-       }),
+       in_joints([](auto v) { return v[1] *= degrees, v[2] *= degrees, v[4] *= degrees, v; }),
        {check, registration},
        {"yaw", "looks like degrees"}},
       {"insertion in mm",
-       in_joints([](auto v) {
-         return std::array{v[0], v[1], v[2], v[3] * 1000, v[4]};
-       }),
+       in_joints([](auto v) { return v[3] *= 1000, v; }),
        {check, registration},
        {"insertion", "looks like millimetres"}},
       {"times in ms",
-       in_joints([](auto v) {
-         return std::array{v[0] * 1000, v[1], v[2], v[3], v[4]};
-       }),
+       in_joints([](auto v) { return v[0] *= 1000, v; }),
        {check, registration},
        {"time_s", "looks like milliseconds"}},
       {"joints of another recording",
@@ -198,15 +191,11 @@ std::vector<Mistake> mistakes() {
        {check, registration},
        {"is it this arm's recording", "both clocks"}},
       {"clocks 40 s apart",
-       in_joints([](auto v) {
-         return std::array{v[0] + 40, v[1], v[2], v[3], v[4]};
-       }),
+       in_joints([](auto v) { return v[0] += 40, v; }),
        {check, registration},
        {"both clocks run within 30 s", "joints from 39.4 to 52.9 s"}},
       {"joint columns exchanged",
-       in_joints([](auto v) {
-         return std::array{v[0], v[2], v[1], v[3], v[4]};
-       }),
+       in_joints([](auto v) { return std::swap(v[1], v[2]), v; }),
        {check, registration},
        {"yaw and pitch are exchanged", "joints.names has theta, phi, rho, psi"}},
       {"joint names of another arm",
