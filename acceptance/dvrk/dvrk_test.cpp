@@ -102,11 +102,11 @@ class Judge {
     const std::lock_guard lock(mutex_);
     return samples_.empty() ? SixJoints::Constant(NAN) : samples_.back().joints;
   }
-  std::vector<Sample> samples(double from_s, double to_s = INFINITY) {
+  std::vector<Sample> samples(double from_s) {
     const std::lock_guard lock(mutex_);
     std::vector<Sample> some;
     for (const Sample& sample : samples_)
-      if (from_s <= sample.time_s && sample.time_s <= to_s) some.push_back(sample);
+      if (sample.time_s >= from_s) some.push_back(sample);
     return some;
   }
   // Without a tool, the actuators of the sterile adapter are joints, too.
