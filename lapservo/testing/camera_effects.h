@@ -14,7 +14,7 @@ namespace lapservo::effects {
 
 /// Strengths; those of the default do nothing.
 struct CameraEffects {
-  ChromaticAberration aberration;
+  ChromaticAberration aberration{};
   double vignette = 0;    ///< fraction of light lost in the corners
   double crosstalk = 0;   ///< fraction of each channel's light that goes to each of the others
   bool mosaic = false;    ///< one channel a pixel, and demosaicing

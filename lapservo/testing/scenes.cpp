@@ -8,6 +8,7 @@
 #include <string>
 #include <utility>
 
+#include "lapservo/core/angles.h"
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/geometry/rotation.h"
 #include "lapservo/kinematics/centre_line.h"
@@ -82,6 +83,12 @@ JointVector random_configuration(const Rig& rig, std::size_t i, Random& random, 
     return *q;
   }
   throw std::logic_error("no configuration of this instrument is wholly in view");
+}
+
+std::vector<JointVector> random_configurations(const Rig& rig, Random& random) {
+  std::vector<JointVector> all;
+  for (std::size_t i = 0; i < rig.instruments.size(); ++i) all.push_back(random_configuration(rig, i, random));
+  return all;
 }
 
 ShaftPose pose_of(const Rig& rig, std::size_t i, const JointVector& q) {
@@ -231,8 +238,12 @@ JointVector configuration_of_seed(const Rig& rig, std::uint64_t seed) {
 
 }  // namespace
 
-Shot::Shot(std::uint64_t seed, const RenderOptions& options, const Rig& of_rig)
-    : rig(of_rig), q(configuration_of_seed(rig, seed)), bgr(render(rig, {q}, seed, options)), sight(rig, bgr) {}
+Shot::Shot(std::uint64_t of_seed, const RenderOptions& options, const Rig& of_rig)
+    : seed(of_seed),
+      rig(of_rig),
+      q(configuration_of_seed(rig, seed)),
+      bgr(render(rig, {q}, seed, options)),
+      sight(rig, bgr) {}
 
 PoseUnknowns Shot::truth(bool through_rcm) const {
   return {pose_of(rig, 0, q), through_rcm};
@@ -241,6 +252,14 @@ PoseUnknowns Shot::truth(bool through_rcm) const {
 CentreLine Shot::line() const {
   const ShaftPose pose = pose_of(rig, 0, q);
   return centre_line(rig.camera, rig.instruments[0].marker, pose.camera_from_unrolled, pose.psi_rad).value();
+}
+
+double Shot::psi_error_rad(double psi_rad) const {
+  return wrap_pi(psi_rad - q.psi_rad);
+}
+
+double Shot::psi_error_rad(const PoseUnknowns& unknowns) const {
+  return psi_error_rad(q_of(rig, unknowns).psi_rad);
 }
 
 const Shot& usual_shot(std::uint64_t seed) {

@@ -28,6 +28,9 @@ Marker scaled_to(Marker marker, double diameter_m);
 /// The marker wholly in view (a lens's distortion neglected), at most so far from facing the camera.
 JointVector random_configuration(const Rig& rig, std::size_t instrument, Random& random, double steepest_rad = 0.35);
 
+/// One of each instrument.
+std::vector<JointVector> random_configurations(const Rig& rig, Random& random);
+
 ShaftPose pose_of(const Rig& rig, std::size_t instrument, const JointVector& q);
 
 /// Three independent standard normal numbers.
@@ -78,6 +81,7 @@ class Sight {
 
 /// One instrument somewhere before the usual rig's camera.
 struct Shot {
+  std::uint64_t seed;
   Rig rig;
   JointVector q;
   cv::Mat bgr;
@@ -86,6 +90,8 @@ struct Shot {
   explicit Shot(std::uint64_t seed, const RenderOptions& options = {}, const Rig& of_rig = usual_rig());
   PoseUnknowns truth(bool through_rcm) const;
   CentreLine line() const;  ///< the true one
+  double psi_error_rad(double psi_rad) const;
+  double psi_error_rad(const PoseUnknowns& unknowns) const;  ///< of psi by the registration
 };
 
 /// An image of the first instrument by a lens with lateral chromatic aberration: each channel has a camera with another

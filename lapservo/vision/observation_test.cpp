@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <set>
-#include <string>
 
 #include <Eigen/Cholesky>
 #include <gtest/gtest.h>
@@ -10,7 +9,7 @@
 
 #include "lapservo/core/angles.h"
 #include "lapservo/kinematics/centre_line.h"
-#include "lapservo/testing/scenes.h"
+#include "lapservo/testing/shots.h"
 #include "lapservo/vision/tracker.h"
 
 namespace lapservo::internal {
@@ -25,12 +24,6 @@ Observation observe(const Shot& shot, bool with_rcm) {
   return Tracker(rig).track(shot.bgr)[0];
 }
 
-Shot distorted_shot(std::uint64_t seed) {
-  Rig rig = scenes::usual_rig();
-  rig.camera.distortion = {-0.2, 0.05, 0.0006, -0.0004, 0};
-  return Shot(seed, {}, rig);
-}
-
 bool all_finite(const Observation& o) {
   bool finite = std::isfinite(o.tau_rad) && std::isfinite(o.sigma_tau_rad) && std::isfinite(o.psi_rad) &&
                 o.camera_from_unrolled.translation.allFinite() && o.camera_from_unrolled.rotation.coeffs().allFinite();
@@ -42,18 +35,6 @@ bool all_finite(const Observation& o) {
              std::isfinite(o.features.r_px.value_or(0)) && std::isfinite(o.features.l_px) &&
              std::isfinite(o.features.d_px) && std::isfinite(o.features.cross_ratio);
   return finite;
-}
-
-TEST(Observation, EveryStatusHasAWordOfItsOwn) {
-  std::set<std::string_view> words;
-  for (const Status status :
-       {Status::ok, Status::no_marker, Status::cut, Status::occluded, Status::ambiguous, Status::poor_fit,
-        Status::uncertain, Status::marker_mismatch, Status::damaged, Status::interlaced, Status::blended}) {
-    const std::string_view word = to_string(status);
-    EXPECT_FALSE(word.empty());
-    EXPECT_EQ(word.find_first_of(" ,\"\n"), std::string_view::npos) << word;
-    EXPECT_TRUE(words.insert(word).second) << word;
-  }
 }
 
 // Pose, centre line, edges, features and tau agree.
@@ -84,25 +65,23 @@ void expect_consistent(const Shot& shot, bool with_rcm) {
 }
 
 TEST(Observation, ItsPartsAgree) {
-  const Shot distorted = distorted_shot(1);
+  Rig rig = scenes::usual_rig();
+  rig.camera.distortion = {-0.2, 0.05, 0.0006, -0.0004, 0};
+  const Shot distorted(1, {}, rig);
   for (const bool with_rcm : {true, false}) {
     SCOPED_TRACE(with_rcm ? "with the RCM" : "without");
-    expect_consistent(usual_shot(1), with_rcm);
-    expect_consistent(usual_shot(2), with_rcm);
-    expect_consistent(distorted, with_rcm);
+    for (const Shot* shot : {&usual_shot(1), &usual_shot(2), &distorted}) expect_consistent(*shot, with_rcm);
   }
 }
 
 // sigma_tau is the covariance of q carried through the centre line: against samples of q.
 TEST(Observation, SigmaTauIsThatOfSampledConfigurations) {
-  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
-    SCOPED_TRACE("seed " + std::to_string(seed));
-    const Shot& shot = usual_shot(seed);
+  scenes::for_each_shot(3, [](const Shot& shot) {
     const Observation o = observe(shot, true);
     ASSERT_EQ(o.status, Status::ok);
     const Eigen::Matrix4d root = o.rcm->covariance.llt().matrixL();
     EXPECT_TRUE(o.rcm->covariance.isApprox(o.rcm->covariance.transpose()));
-    Random random(seed);
+    Random random(shot.seed);
     constexpr int samples = 10000;
     double squares = 0;
     for (int i = 0; i < samples; ++i) {
@@ -115,7 +94,7 @@ TEST(Observation, SigmaTauIsThatOfSampledConfigurations) {
       squares += std::pow(wrap_pi(line->tau_rad - o.tau_rad), 2);
     }
     EXPECT_NEAR(o.sigma_tau_rad, std::sqrt(squares / samples), 0.04 * o.sigma_tau_rad);
-  }
+  });
 }
 
 // Errors over their sigmas are 1 in the mean square for each feature, over places, rotations and noise. Without
@@ -123,19 +102,17 @@ TEST(Observation, SigmaTauIsThatOfSampledConfigurations) {
 TEST(Observation, ErrorsOfTheFeaturesAreAsTheirCovarianceSays) {
   constexpr int shots = 40;
   const Rig rig = scenes::usual_rig();
-  Rig unregistered = rig;
-  unregistered.instruments[0].camera_from_rcm.reset();
   const auto rcm_px = projected_rcm_px(rig.camera, *rig.instruments[0].camera_from_rcm);
   const auto vector = [&](const std::array<Eigen::Vector2d, 4>& edges_px) {
     const Features f = features_of(edges_px, rcm_px);
     return Eigen::Vector4d(f.s_rad, *f.r_px, f.l_px, f.d_px);
   };
-  for (const Rig* known : {&rig, static_cast<const Rig*>(&unregistered)}) {
-    SCOPED_TRACE(known == &rig ? "with the RCM" : "without");
+  for (const bool with_rcm : {true, false}) {
+    SCOPED_TRACE(with_rcm ? "with the RCM" : "without");
     Eigen::Vector4d squares = Eigen::Vector4d::Zero();
     for (std::uint64_t seed = 101; seed < 101 + shots; ++seed) {
       const Shot& shot = usual_shot(seed);
-      const Observation o = Tracker(*known).track(shot.bgr)[0];
+      const Observation o = observe(shot, with_rcm);
       ASSERT_EQ(o.status, Status::ok) << seed;
       const Eigen::Matrix4d covariance = features_covariance(o.edges_ideal_px, o.edges_covariance_px2, rcm_px);
       Eigen::Vector4d error = vector(o.edges_ideal_px) - vector(shot.line().ideal_px);
@@ -152,9 +129,7 @@ TEST(Observation, ErrorsOfTheFeaturesAreAsTheirCovarianceSays) {
 TEST(Observation, IsFiniteForEveryStatus) {
   const Rig rig = scenes::usual_rig(3);
   Random random(1);
-  std::vector<JointVector> q;
-  for (std::size_t i = 0; i < 3; ++i) q.push_back(scenes::random_configuration(rig, i, random));
-  const cv::Mat usual = scenes::render(rig, q, 1);
+  const cv::Mat usual = scenes::render(rig, scenes::random_configurations(rig, random), 1);
   const cv::Size size = usual.size();
   std::vector<cv::Mat> images{cv::Mat::zeros(size, CV_8UC3), cv::Mat(size, CV_8UC3, cv::Scalar::all(255)),
                               cv::Mat(size, CV_8UC3, cv::Scalar(20, 200, 110)), usual};

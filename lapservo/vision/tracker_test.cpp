@@ -100,6 +100,14 @@ TEST(Tracker, TakesAnotherRegistration) {
   EXPECT_THROW(Tracker(shot.rig).set_registration(1, {}, Eigen::Matrix<double, 6, 6>::Zero()), std::out_of_range);
 }
 
+TEST(Tracker, RefusesOtherImagesThanTheRigs) {
+  Tracker tracker(scenes::usual_rig());
+  EXPECT_THROW(tracker.track(cv::Mat::zeros(540, 961, CV_8UC3)), InputError);
+  EXPECT_THROW(tracker.track(cv::Mat::zeros(541, 960, CV_8UC3)), InputError);
+  EXPECT_THROW(tracker.track(cv::Mat::zeros(540, 960, CV_8UC1)), InputError);
+  EXPECT_THROW(tracker.track(cv::Mat()), InputError);
+}
+
 TEST(Tracker, RefusesABudgetOfNothing) {
   for (const double nothing : {0.0, -1.0, std::nan("")})
     EXPECT_THROW(Tracker(scenes::usual_rig(), {.frame_budget = nothing}), InputError) << nothing;

@@ -304,12 +304,6 @@ TEST(PictureProcessing, ClippedColoursDoNotMoveTheRotation) {
   EXPECT_LT(std::sqrt(squares / static_cast<double>(shots)), 3e-3);
 }
 
-TEST(PictureProcessing, SubsampledChromaIsTold) {
-  effects::CameraEffects subsampled;
-  subsampled.subsampled = true;
-  EXPECT_LT(std::abs(mean_error_rad(subsampled, true)), 3e-3);
-}
-
 // As decoders that repeat chroma, or take it for sited elsewhere, place it.
 cv::Mat with_chroma_moved(const cv::Mat& bgr, double right_px, double down_px) {
   cv::Mat picture, out;

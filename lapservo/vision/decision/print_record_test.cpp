@@ -13,12 +13,6 @@ bool is_the_rigs(const PrintRecord& record, double tau_rad) {
   return record.known_sides()[print_side(tau_rad)];
 }
 
-TEST(PrintRecord, KnowsNothingAtFirst) {
-  const PrintRecord record;
-  EXPECT_FALSE(record.is_off());
-  for (double tau_rad = -7; tau_rad < 7; tau_rad += 0.1) EXPECT_FALSE(is_the_rigs(record, tau_rad));
-}
-
 // From two sides, each time it comes round, and not from behind.
 TEST(PrintRecord, IsTheRigsWhereItWasSeenToBe) {
   PrintRecord record;

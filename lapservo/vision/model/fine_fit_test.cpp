@@ -1,21 +1,18 @@
 #include "lapservo/vision/model/fine_fit.h"
 
 #include <cmath>
-#include <string>
 
 #include <Eigen/Cholesky>
 #include <gtest/gtest.h>
 
 #include "lapservo/core/angles.h"
-#include "lapservo/testing/scenes.h"
+#include "lapservo/testing/shots.h"
 
 namespace lapservo::internal {
 namespace {
 
 using scenes::fit_from;
 using scenes::Shot;
-using scenes::Sight;
-using scenes::usual_shot;
 
 // As far off as a coarse fit may leave it: up to three pixels.
 PoseVector random_offset(Random& random) {
@@ -41,24 +38,22 @@ void expect_honest(bool rcm) {
   constexpr int frames = 48, bounded = 16;
   double squares = 0, psi_squares = 0, psi_sum = 0;
   int far = 0;
-  for (std::uint64_t seed = 1; seed <= frames; ++seed) {
-    SCOPED_TRACE("seed " + std::to_string(seed));
-    const Shot& shot = usual_shot(seed);
-    Random random(seed + 100);
+  scenes::for_each_shot(frames, [&](const Shot& shot) {
+    Random random(shot.seed + 100);
     const PoseUnknowns truth = shot.truth(rcm);
     const FineFit fit = fit_from(shot, truth.changed_by(random_offset(random)));
     ASSERT_TRUE(fit.converged);
     const double psi_error_rad = truth.change_to(fit.unknowns)[psi_unknown];
     const double square = normalised_square(shot, fit, truth);
     EXPECT_LT(std::abs(psi_error_rad), 6e-3);
-    if (seed <= bounded) {
+    if (shot.seed <= bounded) {
       EXPECT_LT(square, 4);
     }
     far += square > 4;
     squares += square;
     psi_squares += psi_error_rad * psi_error_rad / fit.psi_variance_rad2();
     psi_sum += psi_error_rad;
-  }
+  });
   for (const double sum : {squares, psi_squares}) {
     EXPECT_GT(std::sqrt(sum / frames), 0.45);
     EXPECT_LT(std::sqrt(sum / frames), 1.2);
@@ -75,11 +70,10 @@ TEST(FineFit, ErrorsAreAsPredictedWithoutTheRcm) {
 
 // Whichever side it comes from: Gauss-Newton with right derivatives ends at the same place.
 TEST(FineFit, ForgetsItsStart) {
-  for (std::uint64_t seed = 1; seed <= 6; ++seed)
+  scenes::for_each_shot(6, [](const Shot& shot) {
     for (const bool rcm : {true, false}) {
-      SCOPED_TRACE("seed " + std::to_string(seed) + (rcm ? " through the RCM" : " free"));
-      const Shot& shot = usual_shot(seed);
-      Random random(seed + 200);
+      SCOPED_TRACE(rcm ? "through the RCM" : "free");
+      Random random(shot.seed + 200);
       const PoseUnknowns truth = shot.truth(rcm);
       const FineFit from_truth = fit_from(shot, truth);
       ASSERT_TRUE(from_truth.converged);
@@ -90,13 +84,12 @@ TEST(FineFit, ForgetsItsStart) {
         EXPECT_LT(normalised_square(shot, fit, from_truth.unknowns), 0.02);
       }
     }
+  });
 }
 
 // The colours are looked up about where a boundary was found, on either side of where it was expected.
 TEST(FineFit, FindsBackAlongTheShaftFromEitherSide) {
-  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
-    SCOPED_TRACE("seed " + std::to_string(seed));
-    const Shot& shot = usual_shot(seed);
+  scenes::for_each_shot(8, [](const Shot& shot) {
     const PoseUnknowns truth = shot.truth(true);
     const double px_per_m = shot.rig.camera.fx_px / truth.pose().camera_from_unrolled.translation.z();
     for (const double off_px : {-4.5, 4.5}) {
@@ -104,7 +97,7 @@ TEST(FineFit, FindsBackAlongTheShaftFromEitherSide) {
       ASSERT_TRUE(fit.converged) << off_px;
       EXPECT_LT(normalised_square(shot, fit, truth), 4) << off_px;
     }
-  }
+  });
 }
 
 TEST(FineFit, FindsTheBlurOfTheCamera) {
@@ -124,27 +117,12 @@ TEST(FineFit, FindsTheBlurOfTheCamera) {
 TEST(FineFit, SigmasGrowWithTheNoise) {
   RenderOptions noisy;
   noisy.sensor.read_noise *= 12;
-  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
-    SCOPED_TRACE("seed " + std::to_string(seed));
-    const Shot& clear = usual_shot(seed);
-    const Shot rough(seed, noisy);
+  scenes::for_each_shot(3, [&](const Shot& clear) {
+    const Shot rough(clear.seed, noisy);
     const FineFit in_clear = fit_from(clear, clear.truth(true)), in_rough = fit_from(rough, rough.truth(true));
     ASSERT_TRUE(in_clear.converged && in_rough.converged);
     EXPECT_GT(in_rough.psi_variance_rad2(), 1.5 * in_clear.psi_variance_rad2());
-  }
-}
-
-TEST(FineFit, DoesNotConvergeWhereNothingIs) {
-  const Rig rig = scenes::usual_rig();
-  const Sight sight(rig, scenes::render_nothing(rig, 4));
-  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
-    Random random(seed);
-    const JointVector q = scenes::random_configuration(rig, 0, random);
-    const PoseUnknowns start(scenes::pose_of(rig, 0, q), true);
-    const FineFit fit = fit_finely(sight.scene(), sight.light(), start, {});
-    const int located = fit.used[0] + fit.used[1] + fit.used[2] + fit.used[3];
-    EXPECT_TRUE(!fit.converged || located < fit.lines / 4) << "seed " << seed;
-  }
+  });
 }
 
 }  // namespace

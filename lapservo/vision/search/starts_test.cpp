@@ -1,5 +1,6 @@
 #include "lapservo/vision/search/starts.h"
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <vector>
@@ -7,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/core/angles.h"
-#include "lapservo/testing/scenes.h"
+#include "lapservo/testing/shots.h"
 #include "lapservo/vision/search/explained_colours.h"
 
 namespace lapservo::internal {
@@ -15,7 +16,6 @@ namespace starts_test {
 namespace {
 
 using scenes::Shot;
-using scenes::usual_shot;
 
 constexpr std::uint64_t shots = 6;
 
@@ -34,9 +34,7 @@ bool is_near(const Shot& shot, const PoseUnknowns& start) {
 }
 
 bool any_is_near(const Shot& shot, const std::vector<PoseUnknowns>& starts) {
-  for (const PoseUnknowns& start : starts)
-    if (is_near(shot, start)) return true;
-  return false;
+  return std::any_of(starts.begin(), starts.end(), [&](const PoseUnknowns& start) { return is_near(shot, start); });
 }
 
 Blob largest_blob(const Shot& shot) {
@@ -44,25 +42,22 @@ Blob largest_blob(const Shot& shot) {
 }
 
 TEST(Starts, ABlobTellsThePose) {
-  for (std::uint64_t seed = 1; seed <= shots; ++seed) {
-    SCOPED_TRACE("seed " + std::to_string(seed));
-    const Shot& shot = usual_shot(seed);
+  scenes::for_each_shot(shots, [](const Shot& shot) {
     const Starts free = starts_in(shot.sight.scene(), largest_blob(shot), std::nullopt);
     EXPECT_TRUE(any_is_near(shot, free.poses));
     for (const PoseUnknowns& start : free.poses) EXPECT_FALSE(start.through_rcm());
     EXPECT_FALSE(free.other_bands);
-  }
+  });
 }
 
 TEST(Starts, LinesThroughTheRcmTellThePose) {
-  for (std::uint64_t seed = 1; seed <= shots; ++seed) {
-    SCOPED_TRACE("seed " + std::to_string(seed));
-    const Shot& shot = usual_shot(seed);
-    const Rigid3& camera_from_rcm = *shot.rig.instruments[0].camera_from_rcm;
-    const auto starts = starts_in(shot.sight.scene(), largest_blob(shot), camera_from_rcm).poses;
+  scenes::for_each_shot(shots, [](const Shot& shot) {
+    const auto starts =
+        starts_in(shot.sight.scene(), largest_blob(shot), shot.rig.instruments[0].camera_from_rcm).poses;
     EXPECT_LE(starts.size(), 3U);
     EXPECT_TRUE(any_is_near(shot, starts));
-  }
+    for (const PoseUnknowns& start : starts) EXPECT_TRUE(start.through_rcm());
+  });
 }
 
 // A shaft along the rows, of which the image shows the upper half or less.
@@ -88,22 +83,22 @@ TEST(Starts, ASideBeyondTheBorderIsADiameterFromTheOther) {
   }
 }
 
-// Another instrument's colours are in another order.
-TEST(Starts, AnotherOrderOfColoursIsNoStart) {
-  for (std::uint64_t seed = 1; seed <= shots; ++seed) {
-    SCOPED_TRACE("seed " + std::to_string(seed));
-    const Shot& shot = usual_shot(seed);
+// Another instrument's colours are in another order; other things have one colour.
+TEST(Starts, AreNoneWithoutTheMarkersColoursInTheirOrder) {
+  Blob of_one_colour{{}, 8};
+  for (int i = 0; i < 30; ++i) of_one_colour.samples.push_back({300 + 8 * (i % 6), 200 + 8 * (i / 6), 1});
+  scenes::for_each_shot(shots, [&](const Shot& shot) {
     Scene another = shot.sight.scene();
     std::swap(another.bands[1], another.bands[2]);
     for (const auto& rcm : {shot.rig.instruments[0].camera_from_rcm, std::optional<Rigid3>()})
       EXPECT_TRUE(starts_in(another, largest_blob(shot), rcm).poses.empty());
-  }
+    for (const Blob& blob : {of_one_colour, Blob{}})
+      EXPECT_TRUE(starts_in(shot.sight.scene(), blob, std::nullopt).poses.empty());
+  });
 }
 
 TEST(ExplainedColours, AreMostAtTheTruth) {
-  for (std::uint64_t seed = 1; seed <= shots; ++seed) {
-    SCOPED_TRACE("seed " + std::to_string(seed));
-    const Shot& shot = usual_shot(seed);
+  scenes::for_each_shot(shots, [](const Shot& shot) {
     const Scene scene = shot.sight.scene();
     const PoseUnknowns truth = shot.truth(true);
     const double of_truth_px2 = explained_area_px2(scene, truth.pose(), true);
@@ -117,7 +112,7 @@ TEST(ExplainedColours, AreMostAtTheTruth) {
     // A turn is nothing where any rotation counts, and what can't be enough is not counted to the end.
     EXPECT_GT(explained_area_px2(scene, truth.with_psi(shot.q.psi_rad + 1).pose(), false), 0.5 * of_truth_px2);
     EXPECT_EQ(explained_area_px2(scene, truth.pose(), true, 2 * of_truth_px2), no_area_px2);
-  }
+  });
 }
 
 }  // namespace
