@@ -20,4 +20,7 @@ struct Motion {
 /// The first instrument's exposure with `q` in the middle of it.
 Exposure moving_exposure(const Rig& rig, const JointVector& q, const Motion& motion);
 
+/// Its image before tissue.
+cv::Mat render_moving(const Rig& rig, const JointVector& q, const Motion& motion);
+
 }  // namespace lapservo::scenes

@@ -62,6 +62,11 @@ Rig usual_rig(std::size_t instruments) {
   return rig;
 }
 
+Rig without_rcm(Rig rig) {
+  for (Instrument& instrument : rig.instruments) instrument.camera_from_rcm.reset();
+  return rig;
+}
+
 Marker scaled_to(Marker marker, double diameter_m) {
   for (auto* bands_m : {&marker.bands_upper_m, &marker.bands_lower_m})
     for (double& band_m : *bands_m) band_m *= diameter_m / marker.diameter_m;

@@ -22,6 +22,8 @@ using namespace internal;
 /// 960x540, up to three instruments through ports left, right and above; their markers share colours in other orders.
 Rig usual_rig(std::size_t instruments = 1);
 
+Rig without_rcm(Rig rig);
+
 /// The same print on a shaft of another diameter, in proportion.
 Marker scaled_to(Marker marker, double diameter_m);
 

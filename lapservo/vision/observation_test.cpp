@@ -19,9 +19,7 @@ using scenes::Shot;
 using scenes::usual_shot;
 
 Observation observe(const Shot& shot, bool with_rcm) {
-  Rig rig = shot.rig;
-  if (!with_rcm) rig.instruments[0].camera_from_rcm.reset();
-  return Tracker(rig).track(shot.bgr)[0];
+  return Tracker(with_rcm ? shot.rig : scenes::without_rcm(shot.rig)).track(shot.bgr)[0];
 }
 
 bool all_finite(const Observation& o) {

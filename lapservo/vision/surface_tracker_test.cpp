@@ -73,11 +73,6 @@ Rig measured_rig() {
   return rig;
 }
 
-Rig without_rcm(Rig rig) {
-  for (Instrument& instrument : rig.instruments) instrument.camera_from_rcm.reset();
-  return rig;
-}
-
 Eigen::Vector3d random_direction(Random& random) {
   return Eigen::Vector3d(random.normal(), random.normal(), random.normal()).normalized();
 }
@@ -294,7 +289,7 @@ TEST(SurfaceTracker, BandsThatTheMarkerHasAtNoAzimuthAreAMismatch) {
   marker.bands_upper_m = {0.1 * length_m, 0.3 * length_m, 0.6 * length_m};
   marker.bands_lower_m = {0.2 * length_m, 0.6 * length_m, 0.2 * length_m};
   scenes::for_each_shot(8, [&](const Shot& shot) {
-    for (const Rig& rig : {other, without_rcm(other)})
+    for (const Rig& rig : {other, scenes::without_rcm(other)})
       EXPECT_EQ(to_string(Tracker(rig).track(shot.bgr)[0].status), "marker_mismatch");
   });
 }
@@ -334,7 +329,7 @@ TEST(SurfaceTracker, TwoOfTheSamePrintStayAmbiguousWithinAnyBudget) {
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     const auto frames = rivals_that_change_places(both, random, seed);
     for (const double frame_budget : {1, 1500, 3000, 5000}) {
-      Tracker tracker(without_rcm(scenes::usual_rig()), {.frame_budget = frame_budget});
+      Tracker tracker(scenes::without_rcm(scenes::usual_rig()), {.frame_budget = frame_budget});
       for (std::size_t i = 0; i < 6; ++i) {
         const Status status = tracker.track(frames[i % 2])[0].status;
         EXPECT_NE(status, Status::ok) << seed << ", " << frame_budget << ", frame " << i;
@@ -497,7 +492,7 @@ TEST(SurfaceTracker, WhatIsLostIsNotOkWhileItIsLookedFor) {
       Random random(1);
       const cv::Mat there = scenes::render(rig, scenes::random_configurations(rig, random), 1);
       const cv::Mat gone = with_strips(scenes::render_nothing(rig, 1), rig.instruments[0].marker);
-      if (!registered) rig = without_rcm(rig);
+      if (!registered) rig = scenes::without_rcm(rig);
       for (const double frame_budget : {1, 1500, 4000, 8000}) {
         Tracker tracker(rig, {.frame_budget = frame_budget});
         for (int i = 0; i < 3; ++i) tracker.track(there);
@@ -574,9 +569,7 @@ TEST(Tracker, SearchesTheOnlyFrameOfATemporaryWhole) {
 // A frame of a turn while the shutter was open, with psi in its middle; even, or with a constant acceleration from
 // rest.
 cv::Mat render_turning(const Rig& rig, const JointVector& q, double turn_rad, bool even) {
-  const cv::Mat tissue = make_tissue(rig.camera.width_px, rig.camera.height_px, 5);
-  return Renderer(rig.camera, {shaft_of(rig.instruments[0])}, tissue)
-      .render_exposure(scenes::moving_exposure(rig, q, {.turn_rad = turn_rad, .from_rest = !even}), 1);
+  return scenes::render_moving(rig, q, {.turn_rad = turn_rad, .from_rest = !even});
 }
 
 // The image shows psi's mean over the exposure.

@@ -9,13 +9,15 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "lapservo/core/angles.h"
 #include "lapservo/geometry/response.h"
 #include "lapservo/testing/camera_effects.h"
-#include "lapservo/testing/scenes.h"
+#include "lapservo/testing/shots.h"
 
 namespace lapservo::internal {
 namespace {
+
+using scenes::Shot;
+using scenes::usual_shot;
 
 const std::array<float, 256>& srgb() {
   static const auto table = Response{}.table();
@@ -77,18 +79,23 @@ TEST(PictureProcessing, IsToldFromTheBoundaries) {
   }
 }
 
-// Wherever fit_step located it; also where most of a channel is clipped, which shows saturation less well.
+// Wherever fit_step located it and wherever the pose has it; also where most of a channel is clipped, which shows
+// saturation less well.
 TEST(PictureProcessing, ABoundaryIsFoundWhereItIs) {
+  const auto explained = [](const PictureProcessing& processing, double offset_px, double located_px) {
+    const auto found = explain(srgb(), edges_of(processing, offset_px, located_px), 1).value();
+    for (const auto& bias_px : found.bias_px)
+      EXPECT_NEAR(located_px - bias_px.value(), offset_px, 0.02) << processing.saturation;
+    return found;
+  };
+  const PictureProcessing sharpened{.blur_px = 1, .sharpening = 0.7};
   for (const PictureProcessing& processing :
-       {PictureProcessing{.blur_px = 1, .sharpening = 0.7}, PictureProcessing{.blur_px = 0.9, .chroma_variance_px2 = 1},
+       {sharpened, PictureProcessing{.blur_px = 0.9, .chroma_variance_px2 = 1},
         PictureProcessing{.blur_px = 0.95, .log_mosaic = 0.15, .saturation = 1.2, .sharpening = 0.4},
         PictureProcessing{.blur_px = 1, .saturation = 1.6}, PictureProcessing{.blur_px = 1, .saturation = 1.8}})
-    for (const double offset_px : {-0.1, 0.15}) {
-      const auto explained = explain(srgb(), edges_of(processing, offset_px, 0.3), 1);
-      ASSERT_TRUE(explained);
-      for (const auto& bias_px : explained->bias_px)
-        EXPECT_NEAR(0.3 - bias_px.value(), offset_px, 0.02) << processing.saturation;
-    }
+    for (const double offset_px : {-0.1, 0.15}) explained(processing, offset_px, 0.3);
+  for (const double offset_px : {-2.0, -1.0, 2.0})
+    EXPECT_TRUE(is_believed(explained(sharpened, offset_px, offset_px + 0.1)));
 }
 
 // Each brightness has its own, as far as the processing moved that.
@@ -103,16 +110,6 @@ TEST(PictureProcessing, MeasurementsAreCorrectedByThoseThatAreAsBright) {
   EXPECT_NEAR(explained->measurement_bias_px[9], -0.2, 0.02);
   EXPECT_NEAR(explained->bias_px[1].value(), -0.05, 0.02);
   EXPECT_EQ(explained->measurement_bias_px[8], 0);
-}
-
-// Also where the pose has it elsewhere.
-TEST(PictureProcessing, ABoundaryIsFoundFarFromThePose) {
-  const PictureProcessing processing{.blur_px = 1, .sharpening = 0.7};
-  for (const double offset_px : {-2.0, -1.0, 2.0}) {
-    const auto explained = explain(srgb(), edges_of(processing, offset_px, offset_px + 0.1), 1);
-    ASSERT_TRUE(explained && is_believed(*explained));
-    for (const auto& bias_px : explained->bias_px) EXPECT_NEAR(bias_px.value(), 0.1, 0.02) << offset_px;
-  }
 }
 
 // A blur of luma after the response, where it may be one and where it may not.
@@ -142,15 +139,18 @@ TEST(PictureProcessing, ABoundaryThatWasNotSeenIsInDoubtByAsMuchAsTheWorst) {
   for (const std::size_t k : {0U, 1U, 3U}) EXPECT_LE(magnitudes_px[k], magnitudes_px[2]);
 }
 
+Measurement measured_at(const Eigen::Vector2f& place_px, const Eigen::Vector2f& normal, double residual_px = 0) {
+  Measurement m{};
+  m.group = 1, m.expected_px = place_px, m.normal = normal, m.clear_px = 6, m.residual_px = residual_px;
+  return m;
+}
+
 // Whatever the number of places located: as many as wanted, or all.
 TEST(PooledEdges, TakesAsManyPlacesAsAskedFor) {
-  const scenes::Shot& shot = scenes::usual_shot(1);
   constexpr int most = 12;
   for (const int located : {5, 12, 13, 14, 25, 60}) {
-    Measurement m{};
-    m.group = 1, m.expected_px = {100, 100}, m.normal = {1, 0}, m.clear_px = 6;
-    const std::vector<Measurement> measurements(static_cast<std::size_t>(located), m);
-    EXPECT_EQ(pool_edges(shot.sight.light(), measurements, {most, 1, Between::values}).all[0].places,
+    const std::vector<Measurement> measurements(static_cast<std::size_t>(located), measured_at({100, 100}, {1, 0}));
+    EXPECT_EQ(pool_edges(usual_shot(1).sight.light(), measurements, {most, 1, Between::values}).all[0].places,
               std::min(located, most))
         << located;
   }
@@ -163,11 +163,8 @@ TEST(PooledEdges, AverageWhatIsAsBright) {
   const ImageView view(bgr);
   const LightImage light(view, srgb());
   std::vector<Measurement> measurements;
-  for (const float u : {150.F, 20.F}) {
-    Measurement m{};
-    m.group = 2, m.expected_px = {u, 30}, m.normal = {0.6F, 0.8F}, m.clear_px = 6, m.residual_px = u / 200;
-    measurements.insert(measurements.end(), 10, m);
-  }
+  for (const float u : {150.F, 20.F})
+    measurements.insert(measurements.end(), 10, measured_at({u, 30}, {0.6F, 0.8F}, u / 200));
   const PooledEdges edges = pool_edges(light, measurements, {64, 2, Between::values});
   ASSERT_EQ(edges.all.size(), 2U);
   EXPECT_FLOAT_EQ(edges.all[0].value[1][3], 60 / 255.F);
@@ -180,12 +177,9 @@ TEST(PooledEdges, AverageWhatIsAsBright) {
 
 // Edges that were located far from most places are something else, and move none of them.
 TEST(PooledEdges, LeaveOutWhatLiesElsewhere) {
-  const scenes::Shot& shot = scenes::usual_shot(1);
-  Measurement m{};
-  m.group = 1, m.expected_px = {100, 100}, m.normal = {1, 0}, m.clear_px = 6, m.residual_px = 0.2;
-  std::vector<Measurement> measurements(20, m);
+  std::vector<Measurement> measurements(20, measured_at({100, 100}, {1, 0}, 0.2));
   for (std::size_t i = 0; i < 5; ++i) measurements[4 * i].residual_px = 3;
-  const PooledEdges edges = pool_edges(shot.sight.light(), measurements, {64, 4, Between::values_cubic});
+  const PooledEdges edges = pool_edges(usual_shot(1).sight.light(), measurements, {64, 4, Between::values_cubic});
   int places = 0;
   for (const PooledEdge& edge : edges.all) {
     EXPECT_NEAR(edge.residual_px, 0.2, 1e-9);
@@ -203,11 +197,10 @@ TEST(PooledEdges, SampleBetweenPixels) {
       bgr.at<cv::Vec3b>(v, u) = cv::Vec3b(static_cast<std::uint8_t>(2 * u + v), static_cast<std::uint8_t>(3 * v), 7);
   const ImageView view(bgr);
   const LightImage light(view, srgb());
-  Measurement m{};
-  m.group = 0, m.expected_px = {25.3F, 18.6F}, m.normal = {0.6F, 0.8F}, m.clear_px = 6;
+  const std::vector<Measurement> measurements(8, measured_at({25.3F, 18.6F}, {0.6F, 0.8F}));
   for (const Between between : {Between::values, Between::values_cubic})
     for (int i = 0; i < PooledEdge::samples; ++i) {
-      const PooledEdge edge = pool_edges(light, std::vector<Measurement>(8, m), {64, 4, between}).all[0];
+      const PooledEdge edge = pool_edges(light, measurements, {64, 4, between}).all[0];
       const float t = static_cast<float>(i - PooledEdge::reach), u = 25.3F + 0.6F * t, v = 18.6F + 0.8F * t;
       EXPECT_NEAR(255 * edge.value[0][static_cast<std::size_t>(i)], 2 * u + v, 1e-3);
       EXPECT_NEAR(255 * edge.value[1][static_cast<std::size_t>(i)], 3 * v, 1e-3);
@@ -258,49 +251,44 @@ TEST(PooledEdges, CubicSamplesHaveTheMeanOfWhatIsEncoded) {
 
 constexpr std::uint64_t shots = 6;
 
-FineFit fit_through(const effects::CameraEffects& effects, std::uint64_t seed, bool ask = true) {
-  const scenes::Shot& shot = scenes::usual_shot(seed);
-  const scenes::Sight sight(shot.rig, effects::seen_through(effects, shot.bgr, shot.rig.camera));
+FineFit fit_to(const Shot& shot, const cv::Mat& bgr, const Rig& rig, bool ask = true) {
+  const scenes::Sight sight(rig, bgr);
   return fit_finely(sight.scene(), sight.light(), shot.truth(true), {}, {.ask = ask});
 }
 
-double mean_error_rad(const effects::CameraEffects& effects, bool ask) {
-  double sum_rad = 0;
-  for (std::uint64_t seed = 1; seed <= shots; ++seed) {
-    const FineFit fit = fit_through(effects, seed, ask);
-    EXPECT_TRUE(fit.converged);
-    EXPECT_EQ(fit.processing, ask ? Processing::found : Processing::unknown);
-    const scenes::Shot& shot = scenes::usual_shot(seed);
-    sum_rad += wrap_pi(scenes::q_of(shot.rig, fit.unknowns).psi_rad - shot.q.psi_rad);
-  }
-  return sum_rad / static_cast<double>(shots);
+cv::Mat seen_through(const effects::CameraEffects& effects, const Shot& shot) {
+  return effects::seen_through(effects, shot.bgr, shot.rig.camera);
 }
 
 TEST(PictureProcessing, SharpeningDoesNotMoveTheRotation) {
-  effects::CameraEffects sharpened;
-  sharpened.sharpening = 0.9, sharpened.sharpening_px = 1.3;
-  EXPECT_GT(std::abs(mean_error_rad(sharpened, false)), 3e-3);
-  EXPECT_LT(std::abs(mean_error_rad(sharpened, true)), 1.5e-3);
+  double sum_rad = 0, sum_unasked_rad = 0;
+  scenes::for_each_shot(shots, [&](const Shot& shot) {
+    const cv::Mat seen = seen_through({.sharpening = 0.9, .sharpening_px = 1.3}, shot);
+    const FineFit fit = fit_to(shot, seen, shot.rig), unasked = fit_to(shot, seen, shot.rig, false);
+    EXPECT_TRUE(fit.converged && unasked.converged);
+    EXPECT_EQ(fit.processing, Processing::found);
+    EXPECT_EQ(unasked.processing, Processing::unknown);
+    sum_rad += shot.psi_error_rad(fit.unknowns), sum_unasked_rad += shot.psi_error_rad(unasked.unknowns);
+  });
+  EXPECT_GT(std::abs(sum_unasked_rad / static_cast<double>(shots)), 3e-3);
+  EXPECT_LT(std::abs(sum_rad / static_cast<double>(shots)), 1.5e-3);
 }
 
 // A steep contrast curve and colours that clip at black and at white; the rig knows the curve only. Without asking,
 // some are off by 20 mrad.
 TEST(PictureProcessing, ClippedColoursDoNotMoveTheRotation) {
-  effects::CameraEffects toned;
-  toned.contrast = 0.5, toned.saturation = 1.55;
+  const effects::CameraEffects toned{.contrast = 0.5, .saturation = 1.55};
   double squares = 0;
-  for (std::uint64_t seed = 1; seed <= shots; ++seed) {
-    const scenes::Shot& shot = scenes::usual_shot(seed);
+  scenes::for_each_shot(shots, [&](const Shot& shot) {
     Rig rig = shot.rig;
     rig.camera = effects::calibrated(toned, rig.camera);
-    const scenes::Sight sight(rig, effects::seen_through(toned, shot.bgr, shot.rig.camera));
-    const FineFit fit = fit_finely(sight.scene(), sight.light(), shot.truth(true), {}, {.ask = true});
+    const FineFit fit = fit_to(shot, seen_through(toned, shot), rig);
     ASSERT_TRUE(fit.converged);
     EXPECT_EQ(fit.processing, Processing::found);
-    const double error_rad = wrap_pi(scenes::q_of(shot.rig, fit.unknowns).psi_rad - shot.q.psi_rad);
+    const double error_rad = shot.psi_error_rad(fit.unknowns);
     EXPECT_LT(std::abs(error_rad), 6e-3);
     squares += error_rad * error_rad;
-  }
+  });
   EXPECT_LT(std::sqrt(squares / static_cast<double>(shots)), 3e-3);
 }
 
@@ -322,28 +310,26 @@ cv::Mat with_chroma_moved(const cv::Mat& bgr, double right_px, double down_px) {
 
 // Without the shift as an unknown the mean is up to 25 mrad off.
 TEST(PictureProcessing, ChromaBesideItsPlaceDoesNotMoveTheRotation) {
-  effects::CameraEffects subsampled;
-  subsampled.subsampled = true;
   for (const double right_px : {-0.5, 0.0, 0.5})
     for (const double down_px : {-0.5, 0.0, 0.5}) {
       SCOPED_TRACE(::testing::Message() << right_px << ", " << down_px);
       double sum_rad = 0, squared_sigmas = 0;
-      for (std::uint64_t seed = 1; seed <= shots; ++seed) {
-        const scenes::Shot& shot = scenes::usual_shot(seed);
-        const cv::Mat seen = effects::seen_through(subsampled, shot.bgr, shot.rig.camera);
-        const scenes::Sight sight(shot.rig, with_chroma_moved(seen, right_px, down_px));
-        const FineFit fit = fit_finely(sight.scene(), sight.light(), shot.truth(true), {}, {.ask = true});
+      scenes::for_each_shot(shots, [&](const Shot& shot) {
+        const cv::Mat seen = with_chroma_moved(seen_through({.subsampled = true}, shot), right_px, down_px);
+        const FineFit fit = fit_to(shot, seen, shot.rig);
         EXPECT_EQ(fit.processing, Processing::found);
-        const double error_rad = wrap_pi(scenes::q_of(shot.rig, fit.unknowns).psi_rad - shot.q.psi_rad);
+        const double error_rad = shot.psi_error_rad(fit.unknowns);
         sum_rad += error_rad, squared_sigmas += error_rad * error_rad / fit.psi_variance_rad2();
-      }
+      });
       EXPECT_LT(std::abs(sum_rad / static_cast<double>(shots)), 1.5e-3);
       EXPECT_LT(std::sqrt(squared_sigmas / static_cast<double>(shots)), 1.5);
     }
 }
 
 TEST(PictureProcessing, IsNotSeenWhereThereIsNone) {
-  for (std::uint64_t seed = 1; seed <= shots; ++seed) EXPECT_EQ(fit_through({}, seed).processing, Processing::none);
+  scenes::for_each_shot(shots, [](const Shot& shot) {
+    EXPECT_EQ(fit_to(shot, seen_through({}, shot), shot.rig).processing, Processing::none);
+  });
 }
 
 }  // namespace

@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "lapservo/testing/scenes.h"
+#include "lapservo/testing/shots.h"
 
 namespace lapservo::internal {
 namespace {
@@ -35,20 +35,20 @@ Rig with_boundary_off(Rig rig, std::size_t boundary, double off_m) {
 
 TEST(DisplacedBoundary, IsOneThatShowsPixelsBesideTheFit) {
   constexpr double off_m = 0.3e-3;  // 2 px and more
-  for (std::uint64_t seed = 1; seed <= 6; ++seed)
+  scenes::for_each_shot(6, [&](const Shot& shot) {
     for (const std::size_t boundary : {1U, 2U}) {
-      SCOPED_TRACE("seed " + std::to_string(seed) + ", boundary " + std::to_string(boundary));
-      const Shot& shot = usual_shot(seed);
+      SCOPED_TRACE("boundary " + std::to_string(boundary));
       const FineFit fit = fit_with_few(shot.truth(true), boundary);
       EXPECT_FALSE(is_displaced(shot.sight.scene(), shot.sight.light(), fit));
       for (const double sign : {-1.0, 1.0}) {
-        const cv::Mat bgr = scenes::render(with_boundary_off(shot.rig, boundary, sign * off_m), {shot.q}, seed);
+        const cv::Mat bgr = scenes::render(with_boundary_off(shot.rig, boundary, sign * off_m), {shot.q}, shot.seed);
         const Sight sight(shot.rig, bgr);
         EXPECT_TRUE(is_displaced(sight.scene(), sight.light(), fit)) << sign;
         EXPECT_FALSE(is_displaced(sight.scene(), sight.light(), fit_with_few(shot.truth(true), 3 - boundary)))
             << "of the one that is where it should be";
       }
     }
+  });
 }
 
 TEST(DisplacedBoundary, IsAskedOfFewLinesOnly) {

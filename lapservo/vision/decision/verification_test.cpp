@@ -11,7 +11,7 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/marker/azimuths.h"
-#include "lapservo/testing/scenes.h"
+#include "lapservo/testing/shots.h"
 
 namespace lapservo::internal {
 namespace {
@@ -33,22 +33,18 @@ PoseUnknowns moved_by(const Rig& rig, const PoseUnknowns& unknowns, const Change
 }
 
 TEST(Verification, ARightPoseIsOk) {
-  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
-    SCOPED_TRACE("seed " + std::to_string(seed));
-    const Shot& shot = usual_shot(seed);
+  scenes::for_each_shot(8, [&](const Shot& shot) {
     EXPECT_EQ(validate(shot.sight.scene(), fit_from_truth(shot)), Status::ok);
     const ColourAgreement agreement = colour_agreement(shot.sight.scene(), scenes::pose_of(shot.rig, 0, shot.q));
     EXPECT_GT(agreement.matching, 0.85);
     EXPECT_LT(agreement.wrong, 0.02);
     EXPECT_EQ(agreement.in_image, 1);
-  }
+  });
 }
 
 // A fit that has an end amid its band, where nothing shows it, is of another pose.
 TEST(Verification, ABandThatGoesOnBeyondItsEndIsNotOk) {
-  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
-    SCOPED_TRACE("seed " + std::to_string(seed));
-    const Shot& shot = usual_shot(seed);
+  scenes::for_each_shot(8, [&](const Shot& shot) {
     const ShaftPose pose = scenes::pose_of(shot.rig, 0, shot.q);
     EXPECT_LT(colour_agreement(shot.sight.scene(), pose).beyond, 0.2);
     for (const std::size_t band : {0U, 2U}) {
@@ -65,37 +61,31 @@ TEST(Verification, ABandThatGoesOnBeyondItsEndIsNotOk) {
       fit.unknowns = PoseUnknowns(begins_later, true);
       EXPECT_EQ(validate(sight.scene(), fit), Status::poor_fit) << band;
     }
-  }
+  });
 }
 
 // Started wrong, a fit may find back; what is called ok is right.
 TEST(Verification, WhatAWrongStartLeadsToIsRightOrNotOk) {
   int refused = 0;
-  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
-    SCOPED_TRACE("seed " + std::to_string(seed));
-    const Shot& shot = usual_shot(seed);
+  scenes::for_each_shot(8, [&](const Shot& shot) {
     for (const Change& wrong :
          {Change(0, 0, 0, 0.5), Change(0, 0, 0, -0.5), Change(0, 0, 0, 1.5), Change(0, 0, 0, -1.5), Change(0, 0, 0, pi),
           Change(0, 0, 2e-3, 0), Change(0, 0, -2e-3, 0), Change(0, 0, 6e-3, 0), Change(0.03, 0, 0, 0),
           Change(0.15, 0, 0, 0), Change(0, 0.03, 0, 0), Change(0, -0.15, 0, 0)}) {
       const FineFit fit = fit_from(shot, moved_by(shot.rig, shot.truth(true), wrong));
-      if (validate(shot.sight.scene(), fit) != Status::ok) {
-        ++refused;
-        continue;
-      }
-      const Eigen::Vector4d error = scenes::q_of(shot.rig, fit.unknowns).vector() - shot.q.vector();
-      EXPECT_LT(std::abs(wrap_pi(error[3])), 0.1) << wrong.transpose();
-      EXPECT_LT(std::abs(error[2]), 0.2e-3) << wrong.transpose();
+      const bool is_ok = validate(shot.sight.scene(), fit) == Status::ok;
+      refused += !is_ok;
+      if (!is_ok) continue;
+      EXPECT_LT(std::abs(shot.psi_error_rad(fit.unknowns)), 0.1) << wrong.transpose();
+      EXPECT_LT(std::abs(scenes::q_of(shot.rig, fit.unknowns).rho_m - shot.q.rho_m), 0.2e-3) << wrong.transpose();
     }
-  }
+  });
   EXPECT_GT(refused, 8 * 6);
 }
 
 // Even when all else about the fit looks well.
 TEST(Verification, APoseThatTheColoursContradictIsNotOk) {
-  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
-    SCOPED_TRACE("seed " + std::to_string(seed));
-    const Shot& shot = usual_shot(seed);
+  scenes::for_each_shot(8, [&](const Shot& shot) {
     const Scene scene = shot.sight.scene();
     const FineFit right = fit_from_truth(shot);
     const double matching = colour_agreement(scene, right.unknowns.pose()).matching;
@@ -106,29 +96,23 @@ TEST(Verification, APoseThatTheColoursContradictIsNotOk) {
       EXPECT_NE(validate(scene, fit), Status::ok) << wrong.transpose();
       EXPECT_LT(colour_agreement(scene, fit.unknowns.pose()).matching, matching - 0.1) << wrong.transpose();
     }
-  }
+  });
 }
 
 TEST(Verification, AFitWithoutSupportIsNotOk) {
   const Shot& shot = usual_shot(1);
   const FineFit right = fit_from_truth(shot);
-  const Scene scene = shot.sight.scene();
-  ASSERT_EQ(validate(scene, right), Status::ok);
-  FineFit fit = right;
-  fit.converged = false;
-  EXPECT_EQ(validate(scene, fit), Status::poor_fit);
-  fit = right;
-  fit.used[1] = fit.used[2] = 0;
-  EXPECT_EQ(validate(scene, fit), Status::occluded);
-  fit = right;
-  fit.used[0] = fit.used[3] = 0;
-  EXPECT_EQ(validate(scene, fit), Status::occluded);
-  fit = right;
-  fit.covariance(psi_unknown, psi_unknown) = 0.01;
-  EXPECT_EQ(validate(scene, fit), Status::uncertain);
-  fit = right;
-  fit.inlier_rms_sigmas = 4;
-  EXPECT_EQ(validate(scene, fit), Status::poor_fit);
+  const auto status_with = [&](const auto& change) {
+    FineFit fit = right;
+    change(fit);
+    return validate(shot.sight.scene(), fit);
+  };
+  ASSERT_EQ(status_with([](FineFit&) {}), Status::ok);
+  EXPECT_EQ(status_with([](FineFit& fit) { fit.converged = false; }), Status::poor_fit);
+  EXPECT_EQ(status_with([](FineFit& fit) { fit.used[1] = fit.used[2] = 0; }), Status::occluded);
+  EXPECT_EQ(status_with([](FineFit& fit) { fit.used[0] = fit.used[3] = 0; }), Status::occluded);
+  EXPECT_EQ(status_with([](FineFit& fit) { fit.covariance(psi_unknown, psi_unknown) = 0.01; }), Status::uncertain);
+  EXPECT_EQ(status_with([](FineFit& fit) { fit.inlier_rms_sigmas = 4; }), Status::poor_fit);
 }
 
 // A fit of which each boundary was located on so much of its lines.
@@ -231,9 +215,7 @@ cv::Mat with_blood_along(const Shot& shot, std::size_t boundary) {
 
 TEST(ClearView, NothingHidesABoundaryButBlood) {
   constexpr int lines = 40;
-  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
-    SCOPED_TRACE("seed " + std::to_string(seed));
-    const Shot& shot = usual_shot(seed);
+  scenes::for_each_shot(4, [&](const Shot& shot) {
     const ShaftPose pose = moved_along(shot, 0);
     for (const std::size_t boundary : {0U, 1U, 2U, 3U}) {
       EXPECT_GT(lines_in_clear_view(shot.sight.scene(), pose, boundary, lines), lines / 2) << boundary;
@@ -243,7 +225,7 @@ TEST(ClearView, NothingHidesABoundaryButBlood) {
       EXPECT_GT(lines_in_clear_view(shot.sight.scene(), moved_along(shot, 0.3e-3), boundary, lines), lines / 3)
           << boundary;
     }
-  }
+  });
 }
 
 }  // namespace

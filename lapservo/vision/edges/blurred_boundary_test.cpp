@@ -8,18 +8,14 @@
 #include <Eigen/Core>
 #include <gtest/gtest.h>
 
-#include "lapservo/core/angles.h"
 #include "lapservo/core/statistics.h"
-#include "lapservo/sim/instrument_shaft.h"
-#include "lapservo/sim/tissue.h"
 #include "lapservo/testing/motion.h"
-#include "lapservo/testing/scenes.h"
+#include "lapservo/testing/shots.h"
 
 namespace lapservo::internal {
 namespace {
 
 using scenes::Shot;
-using scenes::usual_shot;
 
 // Where a boundary appears on the line along the shaft, by blurring it numerically: light from each place beside it
 // moves the boundary there, as it lies, and as bright as it is.
@@ -47,18 +43,14 @@ TEST(BlurredBoundary, LiesWhereItsBlurredPictureHasIt) {
       EXPECT_NEAR(moved_by_blur_px(course, blur), blurred_place_px(course, blur), 0.005);
 }
 
-Rig with_thin_instrument() {
-  Rig rig = scenes::usual_rig();
-  rig.instruments[0].marker = scenes::scaled_to(rig.instruments[0].marker, 0.003);
-  return rig;
-}
-
 // A lens's blur moves the inner boundaries of a shaft of 14 px of radius by up to 0.1 px, to the other side on the
 // other half of the shaft.
 TEST(BlurredBoundary, ALensLeavesNoLean) {
+  Rig rig = scenes::usual_rig();
+  rig.instruments[0].marker = scenes::scaled_to(rig.instruments[0].marker, 0.003);
   std::array<std::vector<double>, 2> residuals_px;  // of either half
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
-    const Shot shot(seed, {}, with_thin_instrument());
+    const Shot shot(seed, {}, rig);
     const EdgeMeasurements edges = measure_edges(shot.sight.scene(), shot.sight.light(), shot.truth(true), film_mean_m,
                                                  {2, 0, 3, 1}, {0.96, 0.96});
     for (const Measurement& m : edges.all)
@@ -71,11 +63,11 @@ TEST(BlurredBoundary, ALensLeavesNoLean) {
   EXPECT_NEAR(median(residuals_px[0]), median(residuals_px[1]), 0.015);
 }
 
-// With the marker's middle moving evenly by so many pixels along the shaft and across it.
-cv::Mat render_moving(const Shot& shot, const Eigen::Vector2d& along_and_across_px) {
-  const cv::Mat tissue = make_tissue(shot.rig.camera.width_px, shot.rig.camera.height_px, 5);
-  return Renderer(shot.rig.camera, {shaft_of(shot.rig.instruments[0])}, tissue)
-      .render_exposure(scenes::moving_exposure(shot.rig, shot.q, {.along_and_across_px = along_and_across_px}), 1);
+// To an image of the marker's middle moving evenly by so many pixels along the shaft and across it.
+FineFit fit_to_motion(const Shot& shot, const Eigen::Vector2d& along_and_across_px, const EdgeBlur& blur) {
+  const scenes::Motion motion{.along_and_across_px = along_and_across_px};
+  const scenes::Sight sight(shot.rig, scenes::render_moving(shot.rig, shot.q, motion));
+  return fit_finely(sight.scene(), sight.light(), shot.truth(true), blur);
 }
 
 // Psi's other error (the film's thickness) is alike for two motions that are mirrored at the shaft: only what the fit
@@ -83,43 +75,33 @@ cv::Mat render_moving(const Shot& shot, const Eigen::Vector2d& along_and_across_
 TEST(BlurredBoundary, PsiDoesNotFollowMotionObliqueToTheShaft) {
   constexpr int shots = 3;
   double apart_rad = 0;
-  for (std::uint64_t seed = 1; seed <= shots; ++seed)
+  scenes::for_each_shot(shots, [&](const Shot& shot) {
     for (const double across_px : {-6.0, 6.0}) {
-      const Shot& shot = usual_shot(seed);
-      const scenes::Sight sight(shot.rig, render_moving(shot, {6, across_px}));
-      const FineFit fit = fit_finely(sight.scene(), sight.light(), shot.truth(true), {2, 2});
-      ASSERT_TRUE(fit.converged) << "seed " << seed << ", across " << across_px;
-      EXPECT_GT(fit.blur.correlation * across_px, 0.7 * 6) << "seed " << seed;
-      const double error_rad = wrap_pi(fit.unknowns.pose().psi_rad - shot.q.psi_rad);
-      EXPECT_LT(error_rad * error_rad, 2.5 * 2.5 * fit.psi_variance_rad2())
-          << "seed " << seed << ", across " << across_px;
-      apart_rad += (across_px > 0 ? 1 : -1) * error_rad / shots;
+      SCOPED_TRACE(across_px);
+      const FineFit fit = fit_to_motion(shot, {6, across_px}, {2, 2});
+      ASSERT_TRUE(fit.converged);
+      EXPECT_GT(fit.blur.correlation * across_px, 0.7 * 6);
+      EXPECT_LT(std::abs(shot.psi_error_rad(fit.unknowns.pose().psi_rad)), 2.5 * std::sqrt(fit.psi_variance_rad2()));
+      apart_rad += (across_px > 0 ? 1 : -1) * shot.psi_error_rad(fit.unknowns.pose().psi_rad) / shots;
     }
+  });
   EXPECT_LT(std::abs(apart_rad), 0.004);
-}
-
-// Psi's error by its sigma, of fits to motion oblique to the shaft.
-double error_over_sigma(const Rig& rig, double along_px, double across_px) {
-  constexpr int shots = 4;
-  double squares = 0;
-  for (std::uint64_t seed = 1; seed <= shots; ++seed) {
-    const Shot shot(seed, {}, rig);
-    for (const double way : {-1.0, 1.0}) {
-      const scenes::Sight sight(shot.rig, render_moving(shot, {along_px, way * across_px}));
-      const FineFit fit = fit_finely(sight.scene(), sight.light(), shot.truth(true), {1.2, 1.2});
-      EXPECT_TRUE(fit.converged) << "seed " << seed;
-      const double error_rad = wrap_pi(fit.unknowns.pose().psi_rad - shot.q.psi_rad);
-      squares += error_rad * error_rad / fit.psi_variance_rad2() / (2 * shots);
-    }
-  }
-  return std::sqrt(squares);
 }
 
 // Neither surer than they are nor less sure by far.
 TEST(BlurredBoundary, FitsToMotionKnowHowSureTheyAre) {
-  const double sigmas = error_over_sigma(scenes::usual_rig(), 7, 5);
-  EXPECT_GT(sigmas, 0.4);
-  EXPECT_LT(sigmas, 1.5);
+  constexpr int shots = 4;
+  double squares = 0;
+  scenes::for_each_shot(shots, [&](const Shot& shot) {
+    for (const double across_px : {-5.0, 5.0}) {
+      const FineFit fit = fit_to_motion(shot, {7, across_px}, {1.2, 1.2});
+      EXPECT_TRUE(fit.converged);
+      const double error_rad = shot.psi_error_rad(fit.unknowns.pose().psi_rad);
+      squares += error_rad * error_rad / fit.psi_variance_rad2() / (2 * shots);
+    }
+  });
+  EXPECT_GT(std::sqrt(squares), 0.4);
+  EXPECT_LT(std::sqrt(squares), 1.5);
 }
 
 }  // namespace

@@ -9,9 +9,8 @@
 
 #include <gtest/gtest.h>
 
-#include "lapservo/core/angles.h"
 #include "lapservo/testing/ink_aside.h"
-#include "lapservo/testing/scenes.h"
+#include "lapservo/testing/shots.h"
 #include "lapservo/vision/model/fine_fit.h"
 
 namespace lapservo::internal {
@@ -23,12 +22,6 @@ using scenes::Sight;
 constexpr std::uint64_t shots = 6;
 constexpr int psi = psi_unknown;
 
-Shot shot_of(const Marker& print, std::uint64_t seed) {
-  Rig printed = scenes::usual_rig();
-  printed.instruments[0].marker = print;
-  return Shot(seed, {}, printed);
-}
-
 // By a rig that has another marker. `hidden`: a boundary of which nothing shows.
 PrintFit fit_of(const Shot& shot, const Marker& believed, std::optional<std::size_t> hidden = {},
                 bool is_known = false) {
@@ -39,11 +32,10 @@ PrintFit fit_of(const Shot& shot, const Marker& believed, std::optional<std::siz
   const EdgeBlur lens;
   EdgeMeasurements edges = measure_edges(sight.scene(), sight.light(), truth, film_mean_m, {2, 0, 1, 1}, lens);
   if (hidden) {
-    auto kept = edges.all;
-    kept.clear();
-    for (const Measurement& m : edges.all)
-      if (m.group != *hidden) kept.push_back(m);
-    edges.all = kept;
+    const auto all = edges.all;
+    edges.all.clear();
+    for (const Measurement& m : all)
+      if (m.group != *hidden) edges.all.push_back(m);
   }
   const ResidualLines lines = residual_lines(edges.all);
   const CommonErrors errors = common_errors(edges, lines, lens, std::nullopt, {}, {});
@@ -58,45 +50,43 @@ Marker measured(Marker marker, double sigma_m) {
 }
 
 TEST(PrintFit, AnExactPrintIsTheRigs) {
-  for (std::uint64_t seed = 1; seed <= shots; ++seed) {
-    SCOPED_TRACE("seed " + std::to_string(seed));
-    const Shot& shot = scenes::usual_shot(seed);
+  scenes::for_each_shot(shots, [](const Shot& shot) {
     const PrintFit fit = fit_of(shot, shot.rig.instruments[0].marker);
     EXPECT_LT(fit.off_probability, 0.01);
     EXPECT_LT(fit.p_false, 1e-6);
     EXPECT_LT(std::abs(fit.step[psi]), 4 * std::sqrt(fit.covariance(psi, psi)));
     EXPECT_EQ(fit.psi_variance_by_tolerance, 0);
-  }
+  });
 }
 
 // The rest of the print shows that it is not a turn.
 TEST(PrintFit, AnInkAsideIsSeenAndPsiIsRightAllTheSame) {
-  const Marker nominal = scenes::usual_rig().instruments[0].marker;
+  const Rig nominal = scenes::usual_rig();
   for (const double aside_m : {-0.2e-3, -0.1e-3, 0.1e-3, 0.2e-3})
     for (std::uint64_t seed = 1; seed <= shots; ++seed) {
       SCOPED_TRACE("seed " + std::to_string(seed) + ", aside " + std::to_string(1e3 * aside_m));
-      const Shot shot = shot_of(scenes::with_ink_aside(nominal, aside_m), seed);
-      const Sight sight(scenes::usual_rig(), shot.bgr);
+      Rig printed = nominal;
+      printed.instruments[0].marker = scenes::with_ink_aside(nominal.instruments[0].marker, aside_m);
+      const Shot shot(seed, {}, printed);
+      const Sight sight(nominal, shot.bgr);
       const FineFit fit = fit_finely(sight.scene(), sight.light(), shot.truth(true), {});
       EXPECT_GT(fit.off_probability, 0.8);
-      EXPECT_LT(std::abs(wrap_pi(scenes::q_of(shot.rig, fit.unknowns).psi_rad - shot.q.psi_rad)),
-                4 * std::sqrt(fit.psi_variance_rad2()));
+      EXPECT_LT(std::abs(shot.psi_error_rad(fit.unknowns)), 4 * std::sqrt(fit.psi_variance_rad2()));
     }
 }
 
 // A hidden boundary may lie anywhere, and a misprint then looks like a turn.
 TEST(PrintFit, WhatHidesABoundaryLeavesPsiInDoubtUnlessThePrintWasMeasured) {
   for (const std::size_t boundary : {1U, 2U})
-    for (std::uint64_t seed = 1; seed <= shots; ++seed) {
-      SCOPED_TRACE("seed " + std::to_string(seed) + ", boundary " + std::to_string(boundary));
-      const Shot& shot = scenes::usual_shot(seed);
+    scenes::for_each_shot(shots, [&](const Shot& shot) {
+      SCOPED_TRACE("boundary " + std::to_string(boundary));
       const Marker& marker = shot.rig.instruments[0].marker;
       const auto p_false = [&](const Marker& believed) { return fit_of(shot, believed, boundary).p_false; };
       EXPECT_GT(p_false(marker), 1e-3);
       EXPECT_LT(fit_of(shot, marker, boundary, true).p_false, 1e-3) << "seen before";
       EXPECT_LT(p_false(measured(marker, 1e-5)), 1e-3);
       EXPECT_GT(p_false(measured(marker, 3e-4)), 1e-3) << "not to within what matters";
-    }
+    });
 }
 
 TEST(PrintFit, TheTolerancesShareOfPsisVarianceGrowsWithIt) {
@@ -113,9 +103,7 @@ TEST(PrintFit, TheTolerancesShareOfPsisVarianceGrowsWithIt) {
 }
 
 TEST(PrintFit, AToleranceOfNothingChangesNothing) {
-  for (std::uint64_t seed = 1; seed <= shots; ++seed) {
-    SCOPED_TRACE("seed " + std::to_string(seed));
-    const Shot& shot = scenes::usual_shot(seed);
+  scenes::for_each_shot(shots, [](const Shot& shot) {
     Marker marker = shot.rig.instruments[0].marker;
     const PrintFit without = fit_of(shot, marker);
     marker.tolerance_m = 1e-9;
@@ -124,7 +112,7 @@ TEST(PrintFit, AToleranceOfNothingChangesNothing) {
     EXPECT_NEAR(with.covariance(psi, psi), without.covariance(psi, psi), 1e-3 * without.covariance(psi, psi));
     EXPECT_NEAR(with.p_false, without.p_false, 1e-3 * without.p_false);
     EXPECT_LT(with.psi_variance_by_tolerance, 1e-3 * with.covariance(psi, psi));
-  }
+  });
 }
 
 TEST(PrintFit, AnErrorIsFalseBeyondATenthOfARadian) {

@@ -41,9 +41,8 @@ TEST(ShaftCover, LeavesWhatLiesBesideIt) {
   Blob beside = it.blobs[0];
   const auto middle_px = it.scene.camera.raw_from_point(it.pose.camera_from_unrolled *
                                                         Eigen::Vector3d(0, 0, 1.8 * it.scene.marker.length_m()));
-  for (Blob::Sample& sample : beside.samples) {
+  for (Blob::Sample& sample : beside.samples)
     sample.u = static_cast<int>(middle_px.x()), sample.v = static_cast<int>(middle_px.y());
-  }
   const ShaftCover* cover = &it.cover;
   EXPECT_EQ(without({beside}, {&cover, 1}).size(), 1U);
   EXPECT_TRUE(lies_beside(it.scene.camera, it.scene.marker, it.pose, beside, it.scene.bands));
@@ -82,8 +81,8 @@ TEST(ShaftCover, LiesUnderTheShaftAloneWhateverTheLens) {
         ++covered;
         const Eigen::Vector3d ray = rig.camera.ray_from_ideal(rig.camera.ideal_from_raw(Eigen::Vector2d(u, v)).value());
         const Eigen::Vector3d eye = shaft_from_camera.translation, way = shaft_from_camera.rotation * ray;
-        const double apart_m =
-            std::abs(way.head<2>().normalized().x() * eye.y() - way.head<2>().normalized().y() * eye.x());
+        const Eigen::Vector2d across = way.head<2>().normalized();
+        const double apart_m = std::abs(across.x() * eye.y() - across.y() * eye.x());
         far += apart_m > 1.5 * marker.radius_m();
       }
     EXPECT_GT(covered, 300);

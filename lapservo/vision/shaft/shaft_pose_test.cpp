@@ -7,7 +7,7 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/core/random.h"
 #include "lapservo/geometry/cylinder.h"
-#include "lapservo/testing/scenes.h"
+#include "lapservo/testing/shots.h"
 
 namespace lapservo::internal {
 namespace {
@@ -16,13 +16,11 @@ Eigen::Vector3d random_vector(Random& random) {
   return {random.normal(), random.normal(), random.normal()};
 }
 
-Rigid3 random_pose(Random& random) {
-  const Eigen::Vector3d axis = random_vector(random).normalized();
-  return {Eigen::Quaterniond(Eigen::AngleAxisd(random.uniform(-pi, pi), axis)), 0.1 * random_vector(random)};
-}
-
 PoseUnknowns random_unknowns(Random& random) {
-  return {{random_pose(random), random.uniform(-pi, pi)}, false};
+  const Eigen::Vector3d axis = random_vector(random).normalized();
+  const Eigen::Quaterniond rotation(Eigen::AngleAxisd(random.uniform(-pi, pi), axis));
+  const Eigen::Vector3d translation = 0.1 * random_vector(random);
+  return {{{rotation, translation}, random.uniform(-pi, pi)}, false};
 }
 
 TEST(PoseUnknowns, RowsAreTheDerivativeOfTheRetraction) {
@@ -56,15 +54,13 @@ TEST(PoseUnknowns, NoChangeIsNoChangeAndPsiTurnsTheMarkerAlone) {
       EXPECT_LT(a.rotation.angularDistance(b.rotation), 1e-7);
       EXPECT_LT((a.translation - b.translation).norm(), 1e-15);
     };
-    const PoseUnknowns same = unknowns.changed_by(PoseVector::Zero());
-    expect_same_shaft(same);
-    EXPECT_EQ(same.pose().psi_rad, unknowns.pose().psi_rad);
-    const PoseUnknowns turned = unknowns.changed_by(0.3 * PoseVector::Unit(psi_unknown));
-    expect_same_shaft(turned);
-    EXPECT_NEAR(turned.pose().psi_rad, unknowns.pose().psi_rad + 0.3, 1e-12);
-    const PoseUnknowns set = unknowns.with_psi(1.25);
-    expect_same_shaft(set);
-    EXPECT_EQ(set.pose().psi_rad, 1.25);
+    for (const double turn_rad : {0.0, 0.3}) {
+      const PoseUnknowns turned = unknowns.changed_by(turn_rad * PoseVector::Unit(psi_unknown));
+      expect_same_shaft(turned);
+      EXPECT_NEAR(turned.pose().psi_rad, unknowns.pose().psi_rad + turn_rad, 1e-12);
+    }
+    expect_same_shaft(unknowns.with_psi(1.25));
+    EXPECT_EQ(unknowns.with_psi(1.25).pose().psi_rad, 1.25);
   }
 }
 
@@ -81,12 +77,11 @@ TEST(PoseUnknowns, TheChangeToAnotherPoseLeadsThere) {
 
 // tau of the centre line, which lies on that generatrix.
 TEST(FacingTau, IsThatOfTheCentreLine) {
-  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
-    const scenes::Shot& shot = scenes::usual_shot(seed);
+  scenes::for_each_shot(8, [](const scenes::Shot& shot) {
     const auto tau_rad = facing_tau_rad(shot.rig.instruments[0].marker, scenes::pose_of(shot.rig, 0, shot.q));
     ASSERT_TRUE(tau_rad);
-    EXPECT_NEAR(wrap_pi(*tau_rad - shot.line().tau_rad), 0, 1e-9) << "seed " << seed;
-  }
+    EXPECT_NEAR(wrap_pi(*tau_rad - shot.line().tau_rad), 0, 1e-9);
+  });
 }
 
 }  // namespace
