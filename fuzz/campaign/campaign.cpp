@@ -8,9 +8,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <functional>
-#include <iterator>
 #include <map>
 #include <string>
 #include <sys/resource.h>
@@ -119,11 +117,6 @@ class Counts {
   double slowest_s_ = 0;
 };
 
-std::string text_of(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
-
 // Files of good frames, and psi in each of their frames.
 struct Sample {
   std::string extension, bytes;
@@ -164,7 +157,7 @@ std::vector<Sample> samples(const Rig& rig, const fs::path& folder) {
       for (const cv::Mat& frame : frames) video.write(frame);
       video.release();
     }
-    all.push_back({extension, text_of(path), psi_rad});
+    all.push_back({extension, lapservo::testing::read_file(path), psi_rad});
     fs::remove(path);
   }
   return all;
@@ -265,7 +258,7 @@ void try_commands(int count, std::uint64_t seed) {
       const int status = std::system(command.c_str());
       const int code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
       if (code < 0 || code > 2) counts.broken(own, "exit " + std::to_string(code) + ": " + arguments);
-      const std::string said = text_of(log);
+      const std::string said = lapservo::testing::read_file(log);
       if (code == 2 && std::count(said.begin(), said.end(), '\n') != 1)
         counts.broken(own, "not one line: " + arguments + ": " + said);
       for (const auto& entry : fs::directory_iterator(folder.path()))

@@ -37,10 +37,12 @@ struct Strip {
     if (std::abs(x) >= length_px / 2 || std::abs(y) >= width_px / 2) return std::nullopt;
     return x / length_px + 0.5;
   }
-  void paint(cv::Mat& image) const {
+  // In its bands' colours, or in another.
+  void paint(cv::Mat& image, std::optional<cv::Vec3b> bgr = std::nullopt) const {
     for (int v = 0; v < image.rows; ++v)
       for (int u = 0; u < image.cols; ++u)
-        if (const auto x = along(u, v)) image.at<cv::Vec3b>(v, u) = band_bgr[static_cast<std::size_t>(3 * *x)];
+        if (const auto x = along(u, v))
+          image.at<cv::Vec3b>(v, u) = bgr.value_or(band_bgr[static_cast<std::size_t>(3 * *x)]);
   }
 };
 
@@ -108,9 +110,7 @@ TEST(BlobSearch, JoinsWhatBloodPartedAndNothingElse) {
   const Strip marker{{200, 200}, 0.6, 220, 70}, blood{{200, 200}, 0.6, 50, 80}, another{{540, 400}, -0.9, 110, 45};
   marker.paint(image);
   another.paint(image);
-  for (int v = 0; v < image.rows; ++v)
-    for (int u = 0; u < image.cols; ++u)
-      if (blood.along(u, v)) image.at<cv::Vec3b>(v, u) = {20, 20, 90};
+  blood.paint(image, cv::Vec3b(20, 20, 90));
   const auto parts = search(image);
   ASSERT_EQ(parts.size(), 3U);
   const auto joined = joined_blobs(parts);
@@ -127,9 +127,7 @@ TEST(BlobSearch, BridgesAHighlightAlongTheShaft) {
   cv::Mat image = blank();
   const Strip marker{{320, 240}, 0.7, 220, 70}, highlight{{320, 240}, 0.7, 240, 8};
   marker.paint(image);
-  for (int v = 0; v < image.rows; ++v)
-    for (int u = 0; u < image.cols; ++u)
-      if (highlight.along(u, v)) image.at<cv::Vec3b>(v, u) = {255, 255, 255};
+  highlight.paint(image, cv::Vec3b::all(255));
   EXPECT_EQ(search(image).size(), 1U);
 }
 

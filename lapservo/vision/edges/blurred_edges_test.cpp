@@ -52,11 +52,8 @@ TEST(BlurredEdges, AreEachOthersDerivatives) {
 TEST(BlurredEdges, AreNothingFarOutside) {
   for (const float u : {-6.0F, -8.0F, -1e6F}) {
     const BlurredEdge edge = BlurredEdges::instance().at(u);
-    EXPECT_EQ(edge.density, 0) << u;
-    EXPECT_EQ(edge.step, 0) << u;
-    EXPECT_EQ(edge.root, 0) << u;
-    EXPECT_EQ(edge.three_halves, 0) << u;
-    EXPECT_EQ(edge.root_slope, 0) << u;
+    for (const float value : {edge.density, edge.step, edge.root, edge.three_halves, edge.root_slope})
+      EXPECT_EQ(value, 0) << u;
   }
 }
 

@@ -125,8 +125,8 @@ TEST_P(EdgeLines, TogetherAreAsOneByOneOnEveryProcessor) {
 
 TEST_P(EdgeLines, NothingIsLocatedWhereNothingIs) {
   const auto table = Response{}.table();
-  const cv::Mat image(100, 140, CV_8UC3, cv::Scalar(90, 90, 90)), white(100, 140, CV_8UC3, cv::Scalar(255, 255, 255));
-  for (const cv::Mat& flat : {image, white}) {
+  for (const int value : {90, 255}) {
+    const cv::Mat flat(100, 140, CV_8UC3, cv::Scalar::all(value));
     const ImageView view(flat);
     const LightImage light(view, table);
     on_every_target([&] {
