@@ -17,16 +17,8 @@
 namespace {
 using namespace lapservo;
 using namespace lapservo::internal;
+using fuzz::read_or_refuse;
 using fuzz::require;
-
-template <typename Read>
-void read_or_refuse(const Read& read) {
-  try {
-    read();
-  } catch (const InputError& error) {
-    fuzz::require_one_line(error);
-  }
-}
 
 void read_messages(const Bag& bag) {
   for (const BagTopic& topic : bag.topics()) {

@@ -16,32 +16,28 @@ using namespace lapservo::internal;
 using fuzz::require;
 
 void read_number(const CsvTable& table, std::size_t row, const std::string& column) {
-  try {
+  fuzz::read_or_refuse([&] {
     const auto value = table.number_or_empty(row, column);
     require(!value || std::isfinite(*value), "a number is finite");
     require(value.has_value() == !table.text(row, column).empty(), "only an empty field is no number");
     require(!value || parse_finite(table.text(row, column)) == value, "a field is read in one way");
-  } catch (const InputError& error) {
-    fuzz::require_one_line(error);
-  }
+  });
 }
 
 void read_as_configurations(const CsvTable& table) {
   static const Rig rig = fuzz::small_rig(true, false);
-  try {
+  fuzz::read_or_refuse([&] {
     const auto frames = configurations_from(table, rig, "fuzz.csv");
     require(frames.size() * rig.instruments.size() == table.rows(), "every row is used once");
     for (const Configurations& frame : frames)
       for (const JointVector& q : frame) require(q.vector().allFinite(), "q is finite");
-  } catch (const InputError& error) {
-    fuzz::require_one_line(error);
-  }
+  });
 }
 
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  try {
+  fuzz::read_or_refuse([&] {
     const CsvTable table = CsvTable::parse({reinterpret_cast<const char*>(data), size}, "fuzz.csv");
     for (std::size_t row = 0; row < table.rows(); ++row)
       for (const char* column : {"frame", "theta_rad", "phi_rad", "rho_m", "psi_rad", "tau_rad", "e0_u_px"})
@@ -53,8 +49,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         require(CsvTable::parse("a,b\n" + csv_field(text) + ",1\n", "again.csv").text(0, "a") == text,
                 "a field is written as it was read");
       }
-  } catch (const InputError& error) {
-    fuzz::require_one_line(error);
-  }
+  });
   return 0;
 }

@@ -14,11 +14,9 @@ extern "C" int LLVMFuzzerInitialize(int*, char***) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace lapservo;
-  try {
+  fuzz::read_or_refuse([&] {
     const cv::Mat image = decode_image({data, size}, "fuzz.png");
     fuzz::require(image.type() == CV_8UC3 && !image.empty(), "an image is 8-bit BGR");
-  } catch (const InputError& error) {
-    fuzz::require_one_line(error);
-  }
+  });
   return 0;
 }

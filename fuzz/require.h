@@ -21,4 +21,14 @@ inline void require_one_line(const InputError& error) {
     require(static_cast<unsigned char>(c) >= ' ' && c != 0x7f, "an error's text is one printable line");
 }
 
+/// Reads; an InputError of one line is allowed.
+template <typename Read>
+void read_or_refuse(const Read& read) {
+  try {
+    read();
+  } catch (const InputError& error) {
+    require_one_line(error);
+  }
+}
+
 }  // namespace lapservo::fuzz

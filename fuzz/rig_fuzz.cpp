@@ -46,13 +46,11 @@ void require_usable(const Instrument& instrument) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string_view text(reinterpret_cast<const char*>(data), size);
-  try {
+  fuzz::read_or_refuse([&] {
     const Rig rig = parse_rig(text, "fuzz.yaml");
     require(!rig.instruments.empty(), "a rig has an instrument");
     require_usable(rig.camera);
     for (const Instrument& instrument : rig.instruments) require_usable(instrument);
-  } catch (const InputError& error) {
-    fuzz::require_one_line(error);
-  }
+  });
   return 0;
 }

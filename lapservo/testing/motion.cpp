@@ -3,7 +3,7 @@
 #include <Eigen/Cholesky>
 
 #include "lapservo/sim/instrument_shaft.h"
-#include "lapservo/sim/tissue.h"
+#include "lapservo/testing/scenes.h"
 
 namespace lapservo::scenes {
 using namespace internal;
@@ -48,9 +48,7 @@ Exposure moving_exposure(const Rig& rig, const JointVector& q, const Motion& mot
 }
 
 cv::Mat render_moving(const Rig& rig, const JointVector& q, const Motion& motion) {
-  const cv::Mat tissue = make_tissue(rig.camera.width_px, rig.camera.height_px, 5);
-  return Renderer(rig.camera, {shaft_of(rig.instruments[0])}, tissue)
-      .render_exposure(moving_exposure(rig, q, motion), 1);
+  return renderer_of(rig, shaft_of(rig.instruments[0])).render_exposure(moving_exposure(rig, q, motion), 1);
 }
 
 }  // namespace lapservo::scenes

@@ -13,6 +13,7 @@
 #include "lapservo/geometry/rotation.h"
 #include "lapservo/kinematics/centre_line.h"
 #include "lapservo/marker/azimuths.h"
+#include "lapservo/sim/blood.h"
 #include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/tissue.h"
 
@@ -198,6 +199,23 @@ cv::Mat render(const Rig& rig, const std::vector<JointVector>& configurations, s
     placements.push_back(placement_of(rig.instruments[i], configurations[i]));
   }
   return Renderer(rig.camera, shafts, usual_tissue(rig.camera), options).render(placements, seed);
+}
+
+Renderer renderer_of(const Rig& rig, const ShaftModel& shaft) {
+  return Renderer(rig.camera, {shaft}, usual_tissue(rig.camera));
+}
+
+BloodyMotion::BloodyMotion(const Rig& rig, double fraction, std::uint64_t seed, int count) {
+  Random random(seed);
+  const JointVector start = random_configuration(rig, 0, random);
+  ShaftModel shaft = shaft_of(rig.instruments[0]);
+  shaft.blotches = blood_over(shaft.marker, fraction, random);
+  Renderer renderer = renderer_of(rig, shaft);
+  for (int i = 0; i < count; ++i) {
+    q.push_back(start);
+    q.back().theta_rad += 1e-3 * i, q.back().psi_rad += 2e-3 * i;
+    frames.push_back(renderer.render({placement_of(rig.instruments[0], q.back())}, seed));
+  }
 }
 
 cv::Mat render_aberrated(const Rig& rig, const JointVector& q, std::uint64_t seed,

@@ -56,6 +56,17 @@ CrossingPair crossing_pair(const Rig& rig, Random& random, double steepest_rad =
 cv::Mat render(const Rig& rig, const std::vector<JointVector>& configurations, std::uint64_t seed,
                const RenderOptions& options = {});
 
+/// The first instrument in front of tissue, with a shaft as it is.
+Renderer renderer_of(const Rig& rig, const ShaftModel& shaft);
+
+/// Blood over about a fraction of the first instrument's print, while it moves by pixels from frame to frame.
+struct BloodyMotion {
+  std::vector<JointVector> q;
+  std::vector<cv::Mat> frames;
+
+  BloodyMotion(const Rig& rig, double fraction, std::uint64_t seed, int count);
+};
+
 /// Tissue alone.
 cv::Mat render_nothing(const Rig& rig, std::uint64_t seed);
 

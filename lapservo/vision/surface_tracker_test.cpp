@@ -14,9 +14,7 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/geometry/rotation.h"
 #include "lapservo/kinematics/centre_line.h"
-#include "lapservo/sim/blood.h"
 #include "lapservo/sim/instrument_shaft.h"
-#include "lapservo/sim/tissue.h"
 #include "lapservo/testing/camera_effects.h"
 #include "lapservo/testing/ink_aside.h"
 #include "lapservo/testing/motion.h"
@@ -356,25 +354,6 @@ TEST(SurfaceTracker, AContradictedRegistrationIsNoMismatchedMarkerWithinABudget)
   EXPECT_GE(contradicted, 4) << "the test's own power";
 }
 
-// Blood over about a fraction of the first instrument's print, while it moves by pixels from frame to frame.
-struct BloodyMotion {
-  std::vector<JointVector> q;
-  std::vector<cv::Mat> frames;
-
-  BloodyMotion(const Rig& rig, double fraction, std::uint64_t seed, int count) {
-    Random random(seed);
-    const JointVector start = scenes::random_configuration(rig, 0, random);
-    ShaftModel shaft = shaft_of(rig.instruments[0]);
-    shaft.blotches = blood_over(shaft.marker, fraction, random);
-    Renderer renderer(rig.camera, {shaft}, make_tissue(rig.camera.width_px, rig.camera.height_px, 5));
-    for (int i = 0; i < count; ++i) {
-      q.push_back(start);
-      q.back().theta_rad += 1e-3 * i, q.back().psi_rad += 2e-3 * i;
-      frames.push_back(renderer.render({placement_of(rig.instruments[0], q.back())}, seed));
-    }
-  }
-};
-
 // An instrument that turns before a tracker of the rig's, with a print of its own.
 class TurningInstrument {
  public:
@@ -383,7 +362,7 @@ class TurningInstrument {
   }
   // Frames that are ok, of so many, while it turns by as much each time.
   int found(const ShaftModel& shaft, int frames, double step_rad) {
-    Renderer renderer(rig_.camera, {shaft}, make_tissue(rig_.camera.width_px, rig_.camera.height_px, 5));
+    Renderer renderer = scenes::renderer_of(rig_, shaft);
     int found = 0;
     for (int i = 0; i < frames; ++i, q_.psi_rad += step_rad) {
       time_s_ += 0.04;
@@ -517,7 +496,7 @@ TEST(SurfaceTracker, SpreadsALongSearchOverFrames) {
   int found = 0, later = 0;
   for (std::uint64_t seed = 5; seed <= 6; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
-    const BloodyMotion motion(rig, 0.6, seed, frames);
+    const scenes::BloodyMotion motion(rig, 0.6, seed, frames);
     if (SurfaceTracker(rig, true).track(motion.frames[0])[0].status != Status::ok) continue;
     ++found;
     SurfaceTracker tracker(rig, false, frame_budget), again(rig, false, frame_budget);
@@ -544,7 +523,7 @@ TEST(SurfaceTracker, FindsWhatShowsPlainlyDuringALongSearch) {
   int searched = 0;
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
-    const BloodyMotion hidden(rig, 1.3, seed, 3);
+    const scenes::BloodyMotion hidden(rig, 1.3, seed, 3);
     SurfaceTracker tracker(rig, false, 6000);
     for (const cv::Mat& frame : hidden.frames) searched += tracker.track(frame)[0].status != Status::ok;
     expect_right(tracker.track(usual_shot(seed).bgr)[0], usual_shot(seed).q);
@@ -557,7 +536,7 @@ TEST(Tracker, SearchesTheOnlyFrameOfATemporaryWhole) {
   const Rig rig = measured_rig();
   int found = 0;
   for (std::uint64_t seed = 5; seed <= 6; ++seed) {
-    const BloodyMotion motion(rig, 0.6, seed, 1);
+    const scenes::BloodyMotion motion(rig, 0.6, seed, 1);
     const cv::Mat& frame = motion.frames[0];
     const Status whole = SurfaceTracker(rig, true).track(frame)[0].status;
     EXPECT_EQ(Tracker(rig, {.frame_budget = 1}).track(frame)[0].status, whole) << "seed " << seed;
@@ -684,8 +663,7 @@ TEST(SurfaceTracker, FindsAShaftThatIsHalfOutOfTheFrame) {
   double sum = 0, squares = 0, normalised = 0;
   for (const bool right : {false, true}) {
     const BesideBorder place(right);
-    Renderer renderer(place.rig.camera, {shaft_of(place.rig.instruments[0])},
-                      make_tissue(place.rig.camera.width_px, place.rig.camera.height_px, 5));
+    Renderer renderer = scenes::renderer_of(place.rig, shaft_of(place.rig.instruments[0]));
     Random random(right ? 7 : 8);
     for (int i = 0; i < 20; ++i, ++all) {
       SCOPED_TRACE((right ? "right " : "lower ") + std::to_string(i));

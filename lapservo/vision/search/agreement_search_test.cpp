@@ -7,9 +7,6 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/core/angles.h"
-#include "lapservo/sim/blood.h"
-#include "lapservo/sim/instrument_shaft.h"
-#include "lapservo/sim/tissue.h"
 #include "lapservo/testing/scenes.h"
 #include "lapservo/vision/search/explained_colours.h"
 
@@ -25,7 +22,7 @@ struct BloodyShot {
   JointVector q;
   Sight sight;
 
-  explicit BloodyShot(std::uint64_t seed) : BloodyShot(seed, Random(seed)) {}
+  explicit BloodyShot(std::uint64_t seed) : BloodyShot(scenes::BloodyMotion(scenes::usual_rig(), 0.5, seed, 1)) {}
   PoseUnknowns truth() const { return {scenes::pose_of(rig, 0, q), true}; }
   double length_m() const { return rig.instruments[0].marker.length_m(); }
   // A pose of any rotation, at another depth along the line of sight.
@@ -36,14 +33,7 @@ struct BloodyShot {
   }
 
  private:
-  BloodyShot(std::uint64_t seed, Random random)
-      : q(scenes::random_configuration(rig, 0, random)), sight(rig, picture(seed, random)) {}
-  cv::Mat picture(std::uint64_t seed, Random& random) const {
-    static const cv::Mat tissue = make_tissue(rig.camera.width_px, rig.camera.height_px, 5);
-    ShaftModel shaft = shaft_of(rig.instruments[0]);
-    shaft.blotches = blood_over(shaft.marker, 0.5, random);
-    return Renderer(rig.camera, {shaft}, tissue).render({placement_of(rig.instruments[0], q)}, seed);
-  }
+  explicit BloodyShot(const scenes::BloodyMotion& seen) : q(seen.q[0]), sight(rig, seen.frames[0]) {}
 };
 
 std::vector<PoseUnknowns> results_of(const BloodyShot& shot, const PoseUnknowns& start) {
