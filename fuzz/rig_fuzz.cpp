@@ -4,7 +4,6 @@
 #include <string_view>
 
 #include "fuzz/require.h"
-#include "lapservo/core/angles.h"
 #include "lapservo/marker/decoder.h"
 #include "lapservo/rig/rig.h"
 

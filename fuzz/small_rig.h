@@ -1,6 +1,5 @@
 #pragma once
 
-#include <optional>
 
 #include "lapservo/core/angles.h"
 #include "lapservo/kinematics/rcm_kinematics.h"

@@ -214,8 +214,7 @@ TEST(SurfaceTracker, InstrumentsKeepTheirNamesInAnyOrderOfTheRig) {
     // One of them gone: its place stays empty, whatever the others show.
     const cv::Mat without = scenes::render(rig, {q[0], q[1]}, seed);
     const auto observations = SurfaceTracker(rig, true).track(without);
-    expect_right(observations[0], q[0]);
-    expect_right(observations[1], q[1]);
+    for (std::size_t i = 0; i < 2; ++i) expect_right(observations[i], q[i]);
     EXPECT_NE(observations[2].status, Status::ok);
   }
 }
@@ -521,13 +520,12 @@ TEST(SurfaceTracker, SpreadsALongSearchOverFrames) {
 TEST(SurfaceTracker, FindsWhatShowsPlainlyDuringALongSearch) {
   const Rig rig = scenes::usual_rig();
   int searched = 0;
-  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
-    SCOPED_TRACE("seed " + std::to_string(seed));
-    const scenes::BloodyMotion hidden(rig, 1.3, seed, 3);
+  scenes::for_each_shot(4, [&](const Shot& shot) {
+    const scenes::BloodyMotion hidden(rig, 1.3, shot.seed, 3);
     SurfaceTracker tracker(rig, false, 6000);
     for (const cv::Mat& frame : hidden.frames) searched += tracker.track(frame)[0].status != Status::ok;
-    expect_right(tracker.track(usual_shot(seed).bgr)[0], usual_shot(seed).q);
-  }
+    expect_right(tracker.track(shot.bgr)[0], shot.q);
+  });
   EXPECT_GE(searched, 6);
 }
 
@@ -554,10 +552,9 @@ cv::Mat render_turning(const Rig& rig, const JointVector& q, double turn_rad, bo
 // The image shows psi's mean over the exposure.
 TEST(SurfaceTracker, ATurnWithinTheExposureGivesPsiOfItsMiddle) {
   double squares = 0, from_rest_squares = 0;
-  for (std::uint64_t seed = 1; seed <= 3; ++seed)
+  scenes::for_each_shot(3, [&](const Shot& shot) {
     for (const double turn_rad : {0.1, -0.25, 0.3}) {
-      SCOPED_TRACE("seed " + std::to_string(seed) + ", turn " + std::to_string(turn_rad));
-      const Shot& shot = usual_shot(seed);
+      SCOPED_TRACE("turn " + std::to_string(turn_rad));
       const Observation even = Tracker(shot.rig).track(render_turning(shot.rig, shot.q, turn_rad, true))[0];
       expect_right(even, shot.q);
       const double error_rad = psi_error_rad(even, shot.q);
@@ -569,6 +566,7 @@ TEST(SurfaceTracker, ATurnWithinTheExposureGivesPsiOfItsMiddle) {
       EXPECT_LT(std::abs(from_rest_rad), std::abs(turn_rad) / 12 + 0.002);
       from_rest_squares += from_rest_rad * from_rest_rad / from_rest.rcm->covariance(3, 3) / 9;
     }
+  });
   EXPECT_LT(std::sqrt(squares), 1.5);
   EXPECT_LT(std::sqrt(from_rest_squares), 1.5);
 }
@@ -639,21 +637,18 @@ struct BesideBorder {
   Eigen::Vector3d border;   // of the image in the camera's frame, at depth 1
   Eigen::Vector3d outside;  // across it
 
-  explicit BesideBorder(bool right) {
+  explicit BesideBorder(bool right) : outside(right ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitY()) {
     const Camera& camera = rig.camera;
-    if (right)
-      border = {(camera.width_px - camera.cx_px) / camera.fx_px, 0, 1}, outside = Eigen::Vector3d::UnitX();
-    else
-      border = {0, (camera.height_px - camera.cy_px) / camera.fy_px, 1}, outside = Eigen::Vector3d::UnitY();
+    border = {right ? (camera.width_px - camera.cx_px) / camera.fx_px : 0,
+              right ? 0 : (camera.height_px - camera.cy_px) / camera.fy_px, 1};
     const Eigen::Vector3d rcm = 0.09 * border + Eigen::Vector3d(right ? 0 : -0.1, right ? -0.09 : 0, 0);
     rig.instruments[0].camera_from_rcm = Rigid3{rotation_between(Eigen::Vector3d::UnitX(), 0.1 * border - rcm), rcm};
   }
   // The proximal end, so far along the border, the axis so far outside of it.
   JointVector at(double depth_m, double along_m, double outside_m) const {
     const Eigen::Vector3d along = Eigen::Vector3d::UnitZ().cross(outside).cwiseAbs();
-    return configuration_through(*rig.instruments[0].camera_from_rcm,
-                                 depth_m * border + along_m * along + outside_m * outside)
-        .value();
+    const Eigen::Vector3d place = depth_m * border + along_m * along + outside_m * outside;
+    return configuration_through(*rig.instruments[0].camera_from_rcm, place).value();
   }
 };
 

@@ -1,6 +1,5 @@
 #include "lapservo/vision/camera/processed_edge.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>

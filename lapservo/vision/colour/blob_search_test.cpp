@@ -1,5 +1,6 @@
 #include "lapservo/vision/colour/blob_search.h"
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 #include <set>
@@ -157,11 +158,8 @@ TEST(BlobSearch, LooksAtTheGivenPartOnly) {
   const cv::Mat part = image(cv::Rect(96, 80, 400, 320));
   const auto in_part = search(part), in_copy = search(part.clone());
   ASSERT_EQ(in_part.size(), 1U);
-  ASSERT_EQ(in_part[0].samples.size(), in_copy[0].samples.size());
-  for (std::size_t i = 0; i < in_part[0].samples.size(); ++i) {
-    EXPECT_EQ(in_part[0].samples[i].u, in_copy[0].samples[i].u);
-    EXPECT_EQ(in_part[0].samples[i].v, in_copy[0].samples[i].v);
-  }
+  EXPECT_TRUE(std::ranges::equal(in_part[0].samples, in_copy.at(0).samples,
+                                 [](const auto& a, const auto& b) { return a.u == b.u && a.v == b.v; }));
 }
 
 }  // namespace

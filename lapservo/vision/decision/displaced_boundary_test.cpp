@@ -1,7 +1,6 @@
 #include "lapservo/vision/decision/displaced_boundary.h"
 
 #include <cstddef>
-#include <cstdint>
 #include <string>
 
 #include <gtest/gtest.h>

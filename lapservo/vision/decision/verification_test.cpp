@@ -2,8 +2,6 @@
 
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
-#include <string>
 
 #include <gtest/gtest.h>
 #include <opencv2/imgproc.hpp>

@@ -1,6 +1,5 @@
 #include "lapservo/vision/edges/film_edge.h"
 
-#include <algorithm>
 #include <cmath>
 #include <vector>
 

@@ -1,7 +1,6 @@
 #include "lapservo/vision/search/agreement_search.h"
 
 #include <cmath>
-#include <string>
 #include <vector>
 
 #include <gtest/gtest.h>

@@ -7,7 +7,6 @@
 
 #include <gtest/gtest.h>
 
-#include "lapservo/core/angles.h"
 #include "lapservo/testing/shots.h"
 #include "lapservo/vision/search/explained_colours.h"
 
@@ -97,7 +96,7 @@ TEST(Starts, AreNoneWithoutTheMarkersColoursInTheirOrder) {
   });
 }
 
-TEST(ExplainedColours, AreMostAtTheTruth) {
+TEST(ExplainedColours, AreMostByFarAtTheTruthWhereNothingIsHidden) {
   scenes::for_each_shot(shots, [](const Shot& shot) {
     const Scene scene = shot.sight.scene();
     const PoseUnknowns truth = shot.truth(true);
