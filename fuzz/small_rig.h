@@ -1,6 +1,5 @@
 #pragma once
 
-
 #include "lapservo/core/angles.h"
 #include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/rig/rig.h"

@@ -128,38 +128,32 @@ std::vector<Sample> samples(const Rig& rig, const fs::path& folder) {
   Renderer renderer(rig.camera, {shaft_of(instrument)}, make_tissue(rig.camera.width_px, rig.camera.height_px, 1));
   std::vector<cv::Mat> frames;
   std::vector<double> psi_rad;
-  const cv::Size size(rig.camera.width_px, rig.camera.height_px);
   for (int i = 0; i < 6; ++i) {
     JointVector q = configuration_through(*instrument.camera_from_rcm, {-0.012, 0.004, 0.1}).value();
-    q.psi_rad = 1;
-    q.psi_rad += 0.1 * i;
+    q.psi_rad = 1 + 0.1 * i;
     frames.push_back(renderer.render({placement_of(instrument, q)}, 7));
     psi_rad.push_back(q.psi_rad);
   }
   std::vector<Sample> all;
-  for (const char* extension : {".png", ".jpg", ".bmp", ".webp", ".ppm"}) {
-    std::vector<std::uint8_t> bytes;
-    cv::imencode(extension, frames[0], bytes);
-    all.push_back({extension, {bytes.begin(), bytes.end()}, {psi_rad[0]}});
-  }
-  for (const char* extension : {".mkv", ".mp4", ".avi", ".ts"}) {
-    const fs::path path = folder / (std::string("sample") + extension);
-    const bool motion_jpeg = std::string(extension) == ".avi";
-    if (std::string(extension) == ".mkv") {  // H.264
-      VideoWriter video(path, 25);
-      for (const cv::Mat& frame : frames) video.add(frame);
-      video.commit();
-    } else {
-      cv::VideoWriter video(
-          path.string(), cv::CAP_FFMPEG,
-          motion_jpeg ? cv::VideoWriter::fourcc('M', 'J', 'P', 'G') : cv::VideoWriter::fourcc('m', 'p', '4', 'v'), 25,
-          size);
-      for (const cv::Mat& frame : frames) video.write(frame);
-      video.release();
-    }
-    all.push_back({extension, lapservo::testing::read_file(path), psi_rad});
+  const auto add = [&](const std::string& extension, const std::vector<double>& shown_rad, const auto& write) {
+    const fs::path path = folder / ("sample" + extension);
+    write(path.string());
+    all.push_back({extension, lapservo::testing::read_file(path), shown_rad});
     fs::remove(path);
-  }
+  };
+  for (const char* extension : {".png", ".jpg", ".bmp", ".webp", ".ppm"})
+    add(extension, {psi_rad[0]}, [&](const std::string& path) { cv::imwrite(path, frames[0]); });
+  add(".mkv", psi_rad, [&](const std::string& path) {  // H.264
+    VideoWriter video(path, 25);
+    for (const cv::Mat& frame : frames) video.add(frame);
+    video.commit();
+  });
+  for (const auto& [extension, code] : {std::pair(".mp4", "mp4v"), {".avi", "MJPG"}, {".ts", "mp4v"}})
+    add(extension, psi_rad, [&, code = code](const std::string& path) {
+      cv::VideoWriter video(path, cv::CAP_FFMPEG, cv::VideoWriter::fourcc(code[0], code[1], code[2], code[3]), 25,
+                            frames[0].size());
+      for (const cv::Mat& frame : frames) video.write(frame);
+    });
   return all;
 }
 

@@ -137,17 +137,12 @@ TEST(Observation, IsFiniteForEveryStatus) {
   images.push_back(noise);
   // Markers partly covered, from ever further on either side.
   for (int covered = 100; covered < size.width; covered += 250) {
-    cv::Mat left = usual.clone(), right = usual.clone(), below = usual.clone();
-    left(cv::Rect(0, 0, covered, size.height)) = cv::Scalar(30, 30, 120);
-    right(cv::Rect(covered, 0, size.width - covered, size.height)) = cv::Scalar(30, 30, 120);
-    below(cv::Rect(0, covered / 2, size.width, size.height - covered / 2)) = cv::Scalar(30, 30, 120);
-    images.insert(images.end(), {left, right, below});
+    const cv::Rect left(0, 0, covered, size.height), right(covered, 0, size.width - covered, size.height),
+        below(0, covered / 2, size.width, size.height - covered / 2);
+    for (const cv::Rect& part : {left, right, below})
+      images.push_back(usual.clone()), images.back()(part) = cv::Scalar(30, 30, 120);
   }
-  for (const double sigma_px : {3.0, 6.0}) {
-    cv::Mat blurred;
-    cv::GaussianBlur(usual, blurred, {}, sigma_px);
-    images.push_back(blurred);
-  }
+  for (const double sigma_px : {3.0, 6.0}) cv::GaussianBlur(usual, images.emplace_back(), {}, sigma_px);
   // Bands without a shaft: flat stripes of the colours.
   cv::Mat stripes = cv::Mat::zeros(size, CV_8UC3);
   stripes(cv::Rect(200, 200, 60, 80)) = cv::Scalar(20, 200, 110);
