@@ -1,7 +1,7 @@
 // Recordings like those of `lapservo sample`, of other cameras, arms and prints, with more noise, as PNG and as H.264,
 // as they are and with something in them that a calibration's model leaves out. A calibration refuses them with the
 // cause, or its sigmas hold. LAPSERVO_MISFIT_RECORDINGS and LAPSERVO_MISFIT_SEED set the number of recordings (1) and
-// the first seed. Each test prints its table.
+// the first seed; LAPSERVO_MISFIT_CLEAN leaves all but the clean ones out. Each test prints its table.
 
 #include <algorithm>
 #include <array>
@@ -90,6 +90,10 @@ std::vector<Recording> recordings() {
   return all;
 }
 
+bool clean_only() {
+  return testing::from_environment("LAPSERVO_MISFIT_CLEAN", 0) != 0;
+}
+
 // --- registration
 
 Answer registration_of(const Swing& swing) {
@@ -163,6 +167,7 @@ TEST(CalibrationMisfit, Registration) {
   for (const Recording& recording : recordings()) {
     const Swing swung = swing(recording);
     clean.add("clean", "", registration_of(swung));
+    if (clean_only()) continue;
     for (const JointDeparture& departure : joint_departures()) {
       Swing changed = swung;
       departure.apply(changed);
@@ -256,6 +261,7 @@ TEST(CalibrationMisfit, Camera) {
   Answers clean, departed;
   for (const Recording& recording : recordings()) {
     clean.add("clean", "", camera_of(recording, {}));
+    if (clean_only()) continue;
     for (const BoardDeparture& departure : board_departures())
       departed.add(departure.name, departure.cause, camera_of(recording, departure));
   }
@@ -285,6 +291,7 @@ TEST(CalibrationMisfit, Marker) {
   Answers clean, departed;
   for (const Recording& recording : recordings()) {
     clean.add("clean", "", marker_of(recording, 0));
+    if (clean_only()) continue;
     for (const double slip_m : {0.4e-3, 0.1e-3, 0.03e-3})
       departed.add("edge slips by " + std::to_string(1e3 * slip_m).substr(0, 4) + " mm", "slips",
                    marker_of(recording, slip_m));

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <source_location>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -13,8 +12,9 @@ namespace lapservo::testing {
 /// Random numbers whose seed is printed with each failure of their scope.
 class SeededRandom : public internal::Random {
  public:
-  explicit SeededRandom(std::uint64_t seed, const std::source_location& place = std::source_location::current())
-      : Random(seed), trace_(place.file_name(), static_cast<int>(place.line()), "seed " + std::to_string(seed)) {}
+  /// `file`, `line`: of the caller; clang 14 has no std::source_location.
+  explicit SeededRandom(std::uint64_t seed, const char* file = __builtin_FILE(), int line = __builtin_LINE())
+      : Random(seed), trace_(file, line, "seed " + std::to_string(seed)) {}
 
  private:
   ::testing::ScopedTrace trace_;
