@@ -31,7 +31,8 @@ std::optional<JointVector> random_configuration_in_view(const Camera& camera, co
   constexpr int max_attempts = 50000;
   constexpr double min_rho_m = 0.02, min_sine_phi = 0.1;  // away from the trocar, and from the singularity
   for (int attempt = 0; attempt < max_attempts; ++attempt) {
-    const Eigen::Vector2d pixel(random.uniform(0, camera.width_px), random.uniform(0, camera.height_px));
+    const double v_px = random.uniform(0, camera.height_px), u_px = random.uniform(0, camera.width_px);
+    const Eigen::Vector2d pixel(u_px, v_px);
     auto q = configuration_through(camera_from_rcm,
                                    camera.ray_from_ideal(pixel) * random.uniform(range.nearest_m, range.farthest_m));
     if (!q || q->rho_m < min_rho_m || std::sin(q->phi_rad) < min_sine_phi) continue;

@@ -124,7 +124,8 @@ std::vector<Rigid3> board_poses(const BoardScene& scene, const Camera& camera, i
                     Eigen::AngleAxisd(random.uniform(-0.3, 0.3), Eigen::Vector3d::UnitZ());
     const double share = random.uniform(0.4, 0.6);  // of the image's width
     const double depth_m = camera.fx_px * scene.square_m * (scene.columns + 1) / (share * camera.width_px);
-    const Eigen::Vector2d at(random.uniform(0.2, 0.8) * camera.width_px, random.uniform(0.2, 0.8) * camera.height_px);
+    const double v_px = random.uniform(0.2, 0.8) * camera.height_px, u_px = random.uniform(0.2, 0.8) * camera.width_px;
+    const Eigen::Vector2d at(u_px, v_px);
     pose.translation = depth_m * camera.ray_from_ideal(at) - pose.rotation * middle_m;
     bool in_view = true;
     for (const double x : {-1.2, scene.columns + 0.2})
