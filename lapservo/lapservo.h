@@ -45,6 +45,7 @@
 #include "lapservo/robot/steady_clock.h"
 #include "lapservo/robot/supervisor.h"
 #include "lapservo/robot/supervisor_state.h"
+#include "lapservo/robot/suspension_watch.h"
 #include "lapservo/stream/endoscope_pose.h"
 #include "lapservo/stream/image_stream.h"
 

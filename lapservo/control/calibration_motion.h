@@ -24,7 +24,8 @@ Eigen::Vector4d swing_reach(const Eigen::Vector4d& start, const JointLimits& lim
 JointMotion swing_motion(const Eigen::Vector4d& start, const JointLimits& limits, double scale, double duration_s);
 
 /// For `calibrate marker`: psi a full turn and a little more, at no more than 0.3 rad/s, after it has gone to where
-/// that begins, and back to `start`. Throws InputError naming `source` where the limits leave no room for a turn.
+/// that begins, and back to `start`, these at up to half of its rate limit. Throws InputError naming `source` where the
+/// limits leave no room for a turn.
 JointMotion turn_motion(const Eigen::Vector4d& start, const JointLimits& limits, const std::string& source);
 
 }  // namespace lapservo::internal

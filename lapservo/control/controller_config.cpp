@@ -1,12 +1,14 @@
 #include "lapservo/control/controller_config.h"
 
 #include <cmath>
+#include <cstddef>
 #include <string>
 
 #include "lapservo/control/delay_estimator.h"
 #include "lapservo/control/motion_limits.h"
 #include "lapservo/control/tracking_law.h"
 #include "lapservo/core/error.h"
+#include "lapservo/core/joint_units.h"
 #include "lapservo/core/words.h"
 
 namespace lapservo {
@@ -40,7 +42,12 @@ void check_gains(const ControllerConfig& config) {
 void check_limits(const JointLimits& limits, double period_s) {
   require_positive("limits.rate", limits.rate);
   require_positive("limits.acceleration", limits.acceleration);
+  constexpr auto plausible = "a number of rad or m: it looks like degrees or millimetres";
   for (int i = 0; i < 4; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    require(limits.rate[i] <= joint_rates.most[k], element("limits.rate", i), limits.rate[i], plausible);
+    require(limits.acceleration[i] <= joint_accelerations.most[k], element("limits.acceleration", i),
+            limits.acceleration[i], plausible);
     require(std::isfinite(limits.lower[i]), element("limits.lower", i), limits.lower[i], "a finite number");
     require(std::isfinite(limits.upper[i]) && limits.upper[i] > limits.lower[i], element("limits.upper", i),
             limits.upper[i], "a number above the lower limit");
@@ -99,6 +106,11 @@ std::string_view to_string(ControlMode mode) {
 
 std::optional<ControlMode> control_mode_from_string(std::string_view word) {
   return read_word(mode_words, word);
+}
+
+JointLimits both_limits(const JointLimits& a, const JointLimits& b) {
+  return {a.lower.cwiseMax(b.lower), a.upper.cwiseMin(b.upper), a.rate.cwiseMin(b.rate),
+          a.acceleration.cwiseMin(b.acceleration)};
 }
 
 ControllerConfig paper_controller(double period_s) {

@@ -35,6 +35,9 @@ struct JointLimits {
   Eigen::Vector4d acceleration{2, 2, 0.2, 7.5};  ///< rad/s^2, m/s^2
 };
 
+/// Those within which both hold: of each joint the nearer position, and the lower rate and acceleration.
+JointLimits both_limits(const JointLimits& a, const JointLimits& b);
+
 /// Where the marker's end points have to stay, in the pixels of FeatureState::ends_px.
 struct ImageWindow {
   double u_min_px = 0, u_max_px = 0, v_min_px = 0, v_max_px = 0;

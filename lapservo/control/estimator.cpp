@@ -54,6 +54,7 @@ class FusedEstimator : public Estimator {
     observer_.start_anew();
   }
   void interrupt() override { observer_.interrupt(); }
+  void restart_tests() override { observer_.forget_contradiction(); }
   bool delay_is_known() const override { return observer_.delay_is_known(); }
 
  private:

@@ -42,6 +42,11 @@ class Estimator {
   /// The measured joints jumped: nothing is to be learnt across.
   virtual void interrupt() {}
 
+  /// The arm is moved by somebody else, or was: a probing motion begins anew.
+  virtual void restart_probing() {}
+  /// A person said start: what contradicted itself is looked at anew.
+  virtual void restart_tests() {}
+
   /// The motion of the joints, `time_s` after the last advance_probing(), that it needs to see before it can estimate
   /// anything; nullopt when it needs none.
   virtual std::optional<Eigen::Vector4d> probing_velocity(double time_s) const;

@@ -55,6 +55,10 @@ class OffsetObserver {
 
   /// The measured joints jumped: nothing is learnt across.
   void interrupt();
+  /// Looks for the delay anew where images and joints agreed at none.
+  void forget_contradiction() {
+    if (delay_is_contradicted()) delay_estimator_ = DelayEstimator(config_.delay_estimator);
+  }
   double delay_s() const { return delay_s_; }
   /// Given, or estimated once.
   bool delay_is_known() const { return config_.delay_s || delay_seen_; }

@@ -19,6 +19,10 @@ class UncalibratedEstimator : public Estimator {
   std::optional<Eigen::Vector4d> probing_velocity(double time_s) const override;
   void advance_probing(double time_s) override;
   std::optional<Unanswered> unanswered() const override { return unanswered_; }
+  void interrupt() override { restart_probing(); }
+  void restart_probing() override {
+    if (std::holds_alternative<Probing>(state_)) state_ = Waiting{};
+  }
 
  private:
   /// For an image, by which the probing motion begins.

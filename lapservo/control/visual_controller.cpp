@@ -49,6 +49,7 @@ void VisualController::reset(double time_s, const Eigen::Vector4d& q_joint) {
   path_.reset(time_s, q_joint);
   arm_response_.restart();
   following_error_limit_.restart();
+  estimator_->restart_probing();
   now_s_ = time_s;
   started_ = true;
 }
@@ -65,6 +66,7 @@ void VisualController::start_over(double time_s, const Eigen::Vector4d& q_joint)
 void VisualController::restart_tests() {
   image_response_.restart();
   error_growth_.restart();
+  estimator_->restart_tests();
   until_start_ = HoldReason::none;
 }
 
@@ -164,6 +166,8 @@ HoldReason VisualController::update(const ImageMeasurement& image) {
   const bool suspended = suspended_ != HoldReason::none;
   if (!image.found && !(suspended && image.camera_from_marker)) return HoldReason::marker_lost;
   if (now_s_ - image.time_s > config_.max_image_age_s) return HoldReason::stale_image;
+  constexpr double most_ahead_s = 1;  // by another clock; all images after it would be older
+  if (image.time_s - now_s_ > most_ahead_s) return HoldReason::bad_time;
   // A repeated or older stamp carries no information: the age of the last measurement goes on growing.
   if (image_s_ && image.time_s <= *image_s_) return image_reason_;
   image_s_ = image.time_s;
@@ -275,7 +279,9 @@ void VisualController::limit(const Law& law, const Eigen::Vector4d& q_joint, Con
   if (step.estimate) {
     const Estimate& now = *step.estimate;
     ends = {now.ends_px + now.ends_jacobian * (motion.position - q_joint), now.ends_jacobian};
-    wanted = cross_gaps(config_.limits, motion, now.gap, arm_response_.drive(), q_joint, law.feed_forward, slowed,
+    JointLimits confirmed = config_.limits;
+    confirmed.rate = confirmed.rate.cwiseMin(law.rate);
+    wanted = cross_gaps(confirmed, motion, now.gap, arm_response_.drive(), q_joint, law.feed_forward, slowed,
                         config_.period_s);
   }
   wanted = following_error_limit_.apply(motion.velocity, wanted, config_.period_s);

@@ -72,6 +72,8 @@ class VisualController {
 
   /// The setpoints from the latest step on.
   const JointPath& path() const { return path_; }
+  /// Whether the last step's joints were where joints can be.
+  bool has_measured() const { return measured_; }
   const ControllerConfig& config() const { return config_; }
   /// The delay, known or estimated.
   double delay_s() const { return estimator_->delay_s(); }

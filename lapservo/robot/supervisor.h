@@ -67,7 +67,7 @@ class Supervisor : public Robot {
   std::string loop_reason_;
   Blocked reported_ = Blocked::none;
   std::function<bool()> is_present_;
-  internal::SuspensionWatch suspension_;
+  SuspensionWatch suspension_;
 };
 
 }  // namespace lapservo

@@ -5,7 +5,7 @@
 
 #include "lapservo/robot/clock.h"
 
-namespace lapservo::internal {
+namespace lapservo {
 
 /// Notices when the computer was suspended.
 class SuspensionWatch {
@@ -23,4 +23,4 @@ class SuspensionWatch {
   double suspended_s_;
 };
 
-}  // namespace lapservo::internal
+}  // namespace lapservo

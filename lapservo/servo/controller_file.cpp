@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "lapservo/control/tracking_law.h"
 #include "lapservo/core/joint_units.h"
 #include "lapservo/core/known_keys.h"
 #include "lapservo/core/yaml_field.h"
@@ -78,6 +79,8 @@ ControllerConfig load_controller(const std::filesystem::path& path, const Contro
   expect_keys(file, {{"mode", "period_s", "gains_per_s", "delay_s", "model_error", "limits", "window"}, {}});
   if (const YamlField mode = file["mode"]; mode.present()) config.mode = read_mode(mode);
   if (const YamlField period = file["period_s"]; period.present()) config.period_s = period.number("a finite number");
+  const bool has_gains = file["gains_per_s"].present() || base.gains.per_s != TrackingGains().per_s;
+  if (config.mode == ControlMode::paper && !has_gains) config.gains = paper_gains(config.period_s);
   if (const YamlField gains = file["gains_per_s"]; gains.present()) config.gains.per_s = four(gains);
   if (const YamlField delay = file["delay_s"]; delay.present()) config.observer.delay_s = read_delay(delay);
   if (const YamlField error = file["model_error"]; error.present())

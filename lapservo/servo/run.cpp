@@ -190,7 +190,15 @@ void run(Supervisor& arm, ImageStream& images, Clock& clock, const RunConfig& co
     if (tick.seen) tick.input.image = tick.seen->measurement;
     if (moving) {
       vision->set_delay(servo.controller().delay_s());
-      moving->carry(tick.input, since_s, features, tick.seen ? tick.seen->first_from_camera : Rigid3());
+      // A goal of the tip shows other features from where the endoscope is then.
+      const Trajectory seen_then{0,
+                                 [&](double time_s) {
+                                   tips.use(moving->camera_from_rcm(start_s + time_s));
+                                   return features.at(time_s);
+                                 },
+                                 {}};
+      moving->carry(tick.input, since_s, seen_then, tick.seen ? tick.seen->first_from_camera : Rigid3());
+      tips.use(moving->camera_from_rcm(tick.input.time_s));
     }
     tick.decision = servo.step(tick.input);
     if (tick.decision.send) arm.send(servo.path());

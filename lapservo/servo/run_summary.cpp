@@ -66,7 +66,7 @@ void RunSummary::add(const ControlTick& tick, const std::optional<InstrumentTrut
   const bool by_truth = truth && !tick.pursues_tip;
   if (by_truth && truth->features) {
     error = feature_error(*truth->features, tick.input.desired.features);
-  } else if (!by_truth && !control.estimate) {
+  } else if (!by_truth && !(control.estimate && tick.input.desired.features.allFinite())) {
     if (converged()) return;
     error.setConstant(std::numeric_limits<double>::infinity());  // not known, and so not small
   }

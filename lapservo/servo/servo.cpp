@@ -19,9 +19,14 @@ const Eigen::Vector4d at_rest(0.002, 0.002, 0.0003, 0.01);
 
 constexpr int contradicted_after = 10;
 
-std::string unanswered_text(const Unanswered& found, const std::array<std::string, 4>& names) {
+std::string unanswered_text(const Unanswered& found, const std::array<std::string, 4>& names, ControlMode mode) {
   const std::string& name = names[static_cast<std::size_t>(found.joint)];
   constexpr double other_way = -0.5;
+  if (found.slope < other_way && mode == ControlMode::uncalibrated)
+    return fmt::format(
+        "{} moves the image the other way than when that was learnt: run servo again where the camera "
+        "was turned",
+        name);
   if (found.slope < other_way)
     return fmt::format("the image moves the other way: joints.sign of {} is wrong, or it is another arm's camera",
                        name);
@@ -31,7 +36,7 @@ std::string unanswered_text(const Unanswered& found, const std::array<std::strin
       name);
 }
 
-std::string remedy_of(const ControlStep& control, const std::array<std::string, 4>& names) {
+std::string remedy_of(const ControlStep& control, const std::array<std::string, 4>& names, ControlMode mode) {
   switch (control.reason) {
     case HoldReason::slow_images:
       return "at least 10 images a second are needed: check the camera's rate, its exposure and the network";
@@ -40,9 +45,11 @@ std::string remedy_of(const ControlStep& control, const std::array<std::string, 
     case HoldReason::endoscope_measured:
       return "say start to continue";
     case HoldReason::image_not_following:
-      return control.unanswered ? unanswered_text(*control.unanswered, names) : "";
+      return control.unanswered ? unanswered_text(*control.unanswered, names, mode) : "";
     case HoldReason::error_grows:
-      return "the arm moves away from its goal: check joints.sign, camera_from_rcm and whose image it is";
+      return mode == ControlMode::uncalibrated
+                 ? "the arm moves away from its goal: run servo again, which learns the image's motion anew"
+                 : "the arm moves away from its goal: check joints.sign, camera_from_rcm and whose image it is";
     case HoldReason::delay_not_found:
       return "images and joints agree at no delay up to 0.3 s: check whose image it is, or give delay_s";
     default:
@@ -57,8 +64,9 @@ bool orderly(const ControlStep& control) {
 // The delay that a calibration measured is where its estimate begins.
 ControllerConfig with_delay_of(const Instrument& instrument, ControllerConfig config) {
   constexpr double longest_s = DelayEstimator::step_s * (DelayEstimator::candidates - 1);
+  constexpr double earliest_s = -0.02;  // noise of one that is 0
   const double delay_s = instrument.image_delay_s.value_or(-1);
-  if (delay_s >= 0 && delay_s <= longest_s) config.observer.initial_delay_s = delay_s;
+  if (delay_s >= earliest_s && delay_s <= longest_s) config.observer.initial_delay_s = std::max(0.0, delay_s);
   return config;
 }
 
@@ -94,16 +102,22 @@ ServoDecision Servo::decide(const ServoInput& input) {
   decision.camera_from_rcm = camera_from_rcm_;
   controller_.expect_following(input.joints.follows);
   const bool enabled = input.joints.operating_state == OperatingState::enabled;
-  if (!std::exchange(enabled_, enabled) && enabled) controller_.need_image_since(input.time_s);
+  if (!std::exchange(enabled_, enabled) && enabled) controller_.need_image_since(input.time_s), begins_ = true;
   if (input.joints.started) controller_.restart_tests();
   decision.control = controller_.step(input.time_s, q, input.image, input.desired, input.readings);
   if (recovery_) recovery_->doubt(decision.control.reason, controller_);
   watch_registration(input);
   decision.registration_contradicted = images_contradicting_ >= contradicted_after;
-  decision.send = orderly(decision.control);
+  // The reading before may have been a wild one, from which nothing is to be sent.
+  if (begins_ && controller_.has_measured()) {
+    begins_ = false;
+    controller_.reset(input.time_s, q);
+    decision.control.setpoint = controller_.path().end();
+  }
+  decision.send = orderly(decision.control) && !begins_;
   start_anew_when_at_rest(input, decision.control.reason);
   decision.release = recovery_ && recovery_->moved();
-  decision.remedy = remedy_of(decision.control, names_);
+  decision.remedy = remedy_of(decision.control, names_, controller_.config().mode);
   if (enabled && !decision.release) return decision;
   decision.control.action = ControlAction::hold;
   if (!decision.release) decision.control.reason = HoldReason::arm_not_enabled, decision.remedy.clear();

@@ -36,6 +36,7 @@ class Servo {
   std::optional<Rigid3> camera_from_rcm_;                           ///< the rig's
   std::optional<EndoscopeRecovery> recovery_;
   bool enabled_ = false;          ///< in the step before
+  bool begins_ = false;           ///< enabled, but no joints have come since that an arm can have
   bool registered_;               ///< the rig says where the RCM is
   int images_contradicting_ = 0;  ///< in a row
   std::optional<double> not_following_since_s_;

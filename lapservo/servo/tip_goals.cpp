@@ -66,6 +66,7 @@ void TipGoals::follow(const JointState& joints) {
 // accelerates evenly (fading memory filter of second order).
 void TipGoals::follow_wrist(const std::vector<double>& now_rad, double time_s) {
   constexpr double silence_s = 0.2;
+  if (!std::isfinite(time_s)) return;
   const double passed_s = time_s - wrist_s_;
   if (!std::all_of(now_rad.begin(), now_rad.end(), [](double angle) { return std::isfinite(angle); })) return;
   if (now_rad.size() == wrist_.size() && !(passed_s > 0)) return;
