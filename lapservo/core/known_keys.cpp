@@ -20,13 +20,15 @@ std::vector<std::string> all_names(const KnownKeys& known) {
   return names;
 }
 
-void expect_sigma(const YamlField& field) {
+// An alias may name what it is part of.
+void expect_sigma(const YamlField& field, int levels = 3) {
+  if (levels == 0) field.fail("nested", sigmas_expected);
   if (field.is_scalar()) {
     field.number_between(0, std::numeric_limits<double>::max(), sigmas_expected);
   } else if (field.is_map()) {
-    for (const auto& [key, value] : field.entries(sigmas_expected)) expect_sigma(value);
+    for (const auto& [key, value] : field.entries(sigmas_expected)) expect_sigma(value, levels - 1);
   } else {
-    for (const YamlField& item : field.list(sigmas_expected)) expect_sigma(item);
+    for (const YamlField& item : field.list(sigmas_expected)) expect_sigma(item, levels - 1);
   }
 }
 

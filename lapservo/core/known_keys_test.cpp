@@ -47,6 +47,7 @@ TEST(KnownKeys, RefusesWhatHidesSomething) {
   EXPECT_EQ(complaint("sigma_seam_rad: 1"), "a.yaml: sigma_seam_rad: is alone, expected seam_rad beside it");
   for (const char* sigma : {"-1", "nan", "x", "[1, -2]", "{data: [1, .inf]}"})
     EXPECT_NE(complaint(std::string("seam_rad: 1\nsigma_seam_rad: ") + sigma), "") << sigma;
+  EXPECT_NE(complaint("seam_rad: 1\nsigma_seam_rad: &a [*a]"), "") << "a list of itself";
 }
 
 }  // namespace

@@ -51,10 +51,11 @@ int parse_image_size(const YamlField& field) {
   return static_cast<int>(value);
 }
 
-// Every pixel must have a ray, else a marker there would be seen and not understood.
+// A marker where pixels have no ray would be seen and not understood.
 void check_invertible(const Camera& camera, const YamlField& coefficients) {
   if (!is_invertible(camera))
-    coefficients.fail("not invertible at the image's border", "k1 k2 p1 p2 k3 of a calibration that covers the image");
+    coefficients.fail("not invertible within the largest circle amid the image",
+                      "k1 k2 p1 p2 k3 of a calibration that covers it");
 }
 
 // A ROS matrix: rows and cols say how the numbers of data lie.

@@ -47,7 +47,8 @@ struct Rig {
   bool operator==(const Rig&) const = default;
 };
 
-/// Reads and checks everything: after it, the camera can be inverted over its whole image and every marker decoded.
+/// Reads and checks everything: after it, the camera can be inverted within the largest circle amid its image and
+/// every marker decoded.
 /// Throws InputError naming file, field, value and what was expected.
 Rig load_rig(const std::filesystem::path& path);
 

@@ -193,8 +193,8 @@ const Complaints impossible_cameras{
     {with("1090", "1e7"), "camera.camera_matrix.data: is 1100 0 639.5 0 1e+07 359.5 0 0 1" + matrix},
     {with("[1100, 0,", "[1100, 2,"), "camera.camera_matrix.data: is 1100 2 639.5 0 1090 359.5 0 0 1" + matrix},
     {with("-0.1", "-5"),
-     "camera.distortion_coefficients.data: is not invertible at the image's border, expected k1 k2 p1 p2 k3 of a "
-     "calibration that covers the image"},
+     "camera.distortion_coefficients.data: is not invertible within the largest circle amid the image, expected k1 k2 "
+     "p1 p2 k3 of a calibration that covers it"},
     {with("gamma:2.2", "gamma:0"), "camera.response: is gamma:0, " + response},
 };
 

@@ -129,7 +129,7 @@ Tool parse_wristed(const YamlField& field, const fs::path& folder) {
       has_file ? read_dvrk_tool(folder / field["file"].text("the path of a dVRK tool file")) : parse_wrist(field);
   parse_readings(field, tool);
   const bool placed = field[key].present();
-  for (const char* other : {"azimuth_rad", "covariance"})
+  for (const char* other : {"azimuth_rad", "sigma_offset_rad", "covariance"})
     if (!placed && field[other].present()) field[other].fail("alone", std::string(key) + " beside it");
   if (!placed) return tool;
   const YamlField azimuth = field["azimuth_rad"];

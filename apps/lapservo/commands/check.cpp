@@ -112,6 +112,7 @@ int check(const CalibrateOptions& options) {
       print = std::async(std::launch::async, [&, frames = evidence.take_key_frames()]() mutable {
         return check_print(rig, index, std::move(frames));
       });
+    checked.findings.has_joints = joints.has_value();
     if (joints && !evidence.poses().empty())
       checked.findings.arm = check_arm(instrument, rig.camera, evidence.poses(), evidence.tracked_psi(),
                                        joints->recording, joints->source);

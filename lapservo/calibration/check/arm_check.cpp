@@ -116,6 +116,7 @@ ArmCheck check_arm(const Instrument& instrument, const Camera& camera, const std
   check.noise_across = best->noise.head<2>().maxCoeff(), check.noise_roll = best->noise[5];
   check.noise = best->noise.maxCoeff();
   if (check.noise > rig_limits.noise) check.fault = explaining_fault(instrument, poses, recording, source, &*best);
+  if (check.fault.empty() && !best->faults.empty()) check.fault = best->faults.front();
   const Eigen::VectorXd& x = best->fit.x;
   const Rigid3 camera_from_rcm = best->model.camera_from_rcm(x);
   const Joints joints = best->model.joints(x);

@@ -21,6 +21,7 @@
 namespace lapservo::internal {
 namespace {
 
+constexpr auto no_frame = "no frame came: see whether the source sends images";
 constexpr std::size_t most_kept = 3;
 constexpr int least_missed = 5;       // frames that contradict the rig's RCM before that is reported
 constexpr double grey_range = 12;     // of 255: largest minus smallest channel, sensor noise included
@@ -96,7 +97,7 @@ void FrameDiagnosis::keep(const cv::Mat& bgr) {
 }
 
 std::string FrameDiagnosis::text(bool lossy) const {
-  if (frames_ == 0) return "no frame came: see whether the source sends images";
+  if (frames_ == 0) return no_frame;
   if (2 * without_instrument_ <= frames_) return text_of_missed_rcm();
   const std::string shown = cause_in_frames(without_instrument_ == frames_);
   return shown.empty() ? text_of_refusals(lossy) : shown;
@@ -122,6 +123,7 @@ std::string FrameDiagnosis::text_of_refusals(bool lossy) const {
 }
 
 std::string FrameDiagnosis::cause() const {
+  if (frames_ == 0) return std::string("; ") + no_frame;
   std::string shown = cause_in_frames(true);
   if (shown.empty()) shown = text_of_refusals(false);
   return shown.empty() ? "" : "; " + shown;

@@ -8,6 +8,7 @@
 #include <fmt/ranges.h>
 
 #include "lapservo/calibration/check/usual_cause.h"
+#include "lapservo/calibration/registration/arm_start.h"
 #include "lapservo/calibration/registration/axes_meeting_point.h"
 #include "lapservo/calibration/registration/registration.h"
 #include "lapservo/core/angles.h"
@@ -224,6 +225,14 @@ class Advisor {
     if (f_.arm) {
       if (!f_.arm->refusal.empty()) return;
       const ArmCheck& arm = *f_.arm;
+      const Eigen::Vector3d sigmas(arm.place_m->sigma, arm.axis_rad->sigma, arm.roll_rad->sigma);
+      if (sigmas[0] > rig_limits.place_m || sigmas[1] > rig_limits.axis_rad || sigmas[2] > rig_limits.roll_rad)
+        add(true,
+            fmt::format(
+                "this recording does not show whether the registration is right: it places the marker to {:.1f} "
+                "mm, {:.0f} mrad (axis), {:.0f} mrad (about it), one sigma: {}",
+                1e3 * sigmas[0], 1e3 * sigmas[1], 1e3 * sigmas[2], arm.fault.empty() ? swing_more : arm.fault),
+            "record the marker and the joints again; then lapservo check", "whether the registration is right");
       const bool placed = !arm.place_m->exceeds(rig_limits.place_m) && !arm.axis_rad->exceeds(rig_limits.axis_rad);
       if (!placed || arm.roll_rad->exceeds(rig_limits.roll_rad))
         add(true,
@@ -247,8 +256,9 @@ class Advisor {
           fmt::format("the axes meet {:.1f} mm from the rig's RCM (sigma {:.1f} mm)", 1e3 * f_.rcm->distance_m->value,
                       1e3 * f_.rcm->distance_m->sigma),
           std::string(command) + " --joints", "poses that the RCM does not bend");
-    add(false, "delay, focal length and the joints' offsets are unknown without the joints", "lapservo check --joints",
-        "the same page with them");
+    if (!f_.has_joints)
+      add(false, "delay, focal length and the joints' offsets are unknown without the joints",
+          "lapservo check --joints", "the same page with them");
   }
 
   // Without any reason above.

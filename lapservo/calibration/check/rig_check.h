@@ -56,6 +56,7 @@ struct RigFindings {
   std::optional<ArmCheck> arm;  ///< with joints
   std::optional<RcmCheck> rcm;  ///< without
   bool registered = false;      ///< the rig has camera_from_rcm
+  bool has_joints = false;      ///< of the recording
   std::optional<WorkSpace> work_space;
 };
 

@@ -21,8 +21,7 @@ ColourMeasurement measure_colour(const Rig& rig, std::size_t instrument, const F
     kept.add(bgr);
     return fmt::format(", {} kept", kept.frames().size());
   });
-  // A camera goes on for ever: the user ends what is enough.
-  if (measured.read.stopped && !live) return measured.calibration.refusal = "stopped", measured;
+  if (measured.read.stopped) return measured.calibration.refusal = "stopped", measured;
   measured.frames = kept.frames().size();
   const bool is_named = recording.source.is_srgb();
   const bool keep_response = is_named || (!replace_response && rig.camera.response.sigma.has_value());
@@ -31,7 +30,8 @@ ColourMeasurement measure_colour(const Rig& rig, std::size_t instrument, const F
     watch.tell(std::nullopt, ++step, ": " + what);
   });
   if (is_named) measured.calibration.response_found = "as it is: the recording names how it encodes light";
-  if (!measured.calibration.refusal.empty()) {
+  if (!measured.calibration.refusal.empty() &&
+      2 * measured.calibration.found_before < static_cast<int>(measured.frames)) {
     FrameDiagnosis diagnosis(rig);
     for (const cv::Mat& bgr : kept.frames()) diagnosis.add(bgr, {});
     measured.calibration.refusal += diagnosis.cause();

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <set>
 #include <utility>
 
 #include "lapservo/calibration/marker/print_adjustment.h"
@@ -246,10 +247,9 @@ bool is_settled(const Adjustment& adjustment, double radius_m) {
 // A sentence for each kind, the clearest first.
 std::vector<std::string> texts_of(const std::vector<PrintFault>& faults, double first_s) {
   std::vector<std::string> texts;
-  std::optional<PrintFault::Kind> told;
+  std::set<PrintFault::Kind> told;
   for (const PrintFault& fault : faults) {
-    if (told == fault.kind) continue;
-    told = fault.kind;
+    if (!told.insert(fault.kind).second) continue;
     char text[200];
     std::snprintf(text, sizeof text,
                   fault.kind == PrintFault::Kind::slips
@@ -357,6 +357,7 @@ MarkerCalibration calibrate_marker(const Rig& rig, std::size_t instrument, std::
     last = fit.round(rounds[stage], true, stage + 1 == rounds.size());
     if (!last) return refused(unsolvable, true);
     if (i == 2) fit.judge_video();
+    if (fit.frames().size() < min_turn_frames) return refused(refusal_of(fit.frames(), nominal));
     if (i >= 2) fit.drop_misfits(*last);
     if (fit.frames().size() < min_turn_frames) return refused(unsolvable, true);
     settled = last->covariance && is_settled(*last, nominal.radius_m());

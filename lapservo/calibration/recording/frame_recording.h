@@ -38,7 +38,7 @@ struct FramesRead {
   int looked_at = 0;
   int damaged = 0;        ///< see Frame::flaw
   int jpegs = 0;          ///< of those looked at: what compressed them saw no frame before
-  bool stopped = false;   ///< by the user
+  bool stopped = false;   ///< by the user, before its end; a camera has none
   bool lossy = false;     ///< FrameSource::is_lossy(), or JPEG
   std::string complaint;  ///< what could not be read; empty when all was
 

@@ -126,8 +126,10 @@ ArmGuess guess_arm(const Instrument& instrument, const std::vector<TimedPose>& p
   guess.joints.sign[3] = std::abs(turn) > std::abs(other) ? 1 : -1;
   if (guess.joints.sign[3] < 0) std::swap(turn, other);
   if (1 - std::abs(other) < telling_misfit * (1 - std::abs(turn))) guess.open_sign = 3;
-  const double offset = instrument.joints->offset[3];
-  guess.joints.offset[3] = offset + wrap_pi(std::arg(turn) - offset);
+  // As the rig has it, but for what a rig may not hold.
+  const double before_rad = instrument.joints->offset[3],
+               offset_rad = before_rad + wrap_pi(std::arg(turn) - before_rad);
+  guess.joints.offset[3] = std::abs(offset_rad) < two_pi ? offset_rad : wrap_pi(offset_rad);
   return guess;
 }
 

@@ -26,8 +26,8 @@ double frame_period_s(const std::vector<TimedPose>& poses) {
 JointFault scale_fault(const std::string& name, std::size_t j) {
   return {[=](double size) {
             return fmt::format(
-                "{} moves by {:.3f} times its readings: check its unit, its gear and its encoder's scale", name,
-                1 + size);
+                "{} moves by {:.3f} times its readings: check its unit, its gear and its encoder's scale{}", name,
+                1 + size, is_length(j) ? ", and the marker's diameter_m, by which depths are measured" : "");
           },
           [j](JointRecording& r, double size) {
             for (auto& at : r.joints) at[j] *= 1 + size;
@@ -124,17 +124,19 @@ JointFault focal_fault() {
 
 JointFault clock_fault(const std::vector<TimedPose>& poses) {
   const double period_s = frame_period_s(poses);
-  return {[=](double size) {
-            return fmt::format(
-                "the images' clock runs {:.4f} times as fast as the joints': if they are {:.4g} images a second, "
-                "read as {:.4g}, give --fps; else stamp both by one clock",
-                1 + size, (1 + size) / period_s, 1 / period_s);
-          },
-          [](JointRecording& r, double size) {
-            const double first_s = r.time_s.front();
-            for (double& time_s : r.time_s) time_s = first_s + (1 + size) * (time_s - first_s);
-          },
-          1e-4, 0, clock_starts(1 / period_s)};
+  return {
+      [=](double size) {
+        return fmt::format(
+            "the images' clock runs {:.4f} times as fast as the joints': if they are {:.4g} images a second, "
+            "read as {:.4g}, give --fps for a folder, or write the video anew at its own rate; else stamp both by one "
+            "clock",
+            1 + size, (1 + size) / period_s, 1 / period_s);
+      },
+      [](JointRecording& r, double size) {
+        const double first_s = r.time_s.front();
+        for (double& time_s : r.time_s) time_s = first_s + (1 + size) * (time_s - first_s);
+      },
+      1e-4, 0, clock_starts(1 / period_s)};
 }
 
 std::vector<JointFault> sized_joint_faults(const Joints& joints, const std::vector<TimedPose>& poses) {

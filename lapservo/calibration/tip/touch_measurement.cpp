@@ -7,6 +7,7 @@
 #include <opencv2/calib3d.hpp>
 
 #include "lapservo/calibration/registration/registration_measurement.h"
+#include "lapservo/core/angles.h"
 #include "lapservo/core/csv.h"
 #include "lapservo/core/error.h"
 #include "lapservo/core/statistics.h"
@@ -59,10 +60,17 @@ std::vector<TouchImage> read_touches(const std::filesystem::path& table, const B
       return static_cast<int>(number);
     };
     TouchImage& image = images.emplace_back();
+    if (csv.text(row, "file").empty())
+      throw InputError(table.string(), fmt::format("row {}: file", row + 1), "empty", "the name of an image");
     image.file = table.parent_path() / csv.text(row, "file");
     if (csv.text(row, "column").empty() && csv.text(row, "row").empty()) continue;
     image.corner = {whole("column", board.columns), whole("row", board.rows)};
-    for (const WristJoint& joint : tool.wrist) image.wrist_rad.push_back(csv.number(row, joint.name));
+    for (const WristJoint& joint : tool.wrist) {
+      const double angle_rad = image.wrist_rad.emplace_back(csv.number(row, joint.name));
+      if (std::abs(angle_rad) > two_pi)
+        throw InputError(table.string(), fmt::format("row {}: {}", row + 1, joint.name), csv.text(row, joint.name),
+                         "radians within 6.283: it looks like degrees");
+    }
   }
   return images;
 }

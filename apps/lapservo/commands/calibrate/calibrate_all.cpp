@@ -18,9 +18,13 @@
 #include "apps/lapservo/cli/subcommands.h"
 #include "apps/lapservo/commands/calibrate/calibrate_steps.h"
 #include "apps/lapservo/commands/record.h"
+#include "apps/lapservo/inputs/joint_input.h"
 #include "lapservo/core/error.h"
 #include "lapservo/rig/calibration_record.h"
 #include "lapservo/rig/rig.h"
+#ifdef LAPSERVO_BAGS
+#include "recordings/open_bag.h"
+#endif
 
 namespace lapservo::app {
 using namespace internal;
@@ -29,6 +33,7 @@ namespace fs = std::filesystem;
 
 struct AllOptions : FrameOptions {
   std::string rig, boards, board, aruco, motion, turn, swing, joints, judged, judged_joints, report, instrument, redo;
+  std::string joint_topic;
   std::string camera, robot, joint_limits;  // of a live system
   std::optional<double> square_mm;
   bool no_questions = false, enable_motion = false;
@@ -143,10 +148,24 @@ class Guide {
 
   int run_camera(const CalibrateOptions& options) const {
     CalibrateCameraOptions camera;
-    static_cast<FrameOptions&>(camera) = options_;
+    static_cast<FrameOptions&>(camera) = frame_options_for(options.input);
     camera.inputs = {options.input}, camera.rig = options.rig;
     camera.board = {options_.board, options_.aruco, options_.square_mm, {}};
     return calibrate_camera(camera);
+  }
+
+  // Topics are of bags and sessions.
+  static bool has_topics(const std::string& input) {
+#ifdef LAPSERVO_BAGS
+    return !bag_of(input).empty();
+#else
+    return input.empty();
+#endif
+  }
+  FrameOptions frame_options_for(const std::string& input) const {
+    FrameOptions options = options_;
+    if (!has_topics(input)) options.image_topic.clear();
+    return options;
   }
 
   // As a user types it; where its page goes is no part of what was done.
@@ -157,11 +176,15 @@ class Guide {
     all.insert(all.end(), {step.name, *step.input, "--rig", options_.rig});
     if (!check && !camera) all.insert(all.end(), {"--out", options_.rig});
     if (!step.joints.empty()) all.insert(all.end(), {"--joints", step.joints});
+    const bool of_joints = check || step.name == "registration";
+    const std::string joint_topic = of_joints ? options_of(step).joint_topic : "";
     all.insert(all.end(), step.arguments.begin(), step.arguments.end());
     const std::vector<std::pair<std::string, std::string>> of_frames{{"--eye", options_.eye},
                                                                      {"--side-by-side", options_.side_by_side},
                                                                      {"--colour-matrix", options_.colour_matrix},
-                                                                     {"--chroma-location", options_.chroma_location}};
+                                                                     {"--chroma-location", options_.chroma_location},
+                                                                     {"--image-topic", options_of(step).image_topic},
+                                                                     {"--joint-topic", joint_topic}};
     for (const auto& [option, value] : of_frames)
       if (!value.empty()) all.insert(all.end(), {option, value});
     if (camera) return all;
@@ -173,8 +196,9 @@ class Guide {
 
   CalibrateOptions options_of(const Step& step) const {
     CalibrateOptions options;
-    static_cast<FrameOptions&>(options) = options_;
+    static_cast<FrameOptions&>(options) = frame_options_for(*step.input);
     options.input = *step.input, options.rig = options_.rig, options.joints = step.joints;
+    if (has_topics(step.joints.empty() ? *step.input : step.joints)) options.joint_topic = options_.joint_topic;
     if (step.name != "check") options.out = options_.rig;
     options.instrument = options_.instrument;
     if (step.name == "check") options.report = options_.report;
@@ -231,6 +255,10 @@ std::string recorded(const AllOptions& options, const std::string& name, const c
     std::printf("%s: as recorded in %s\n", name.c_str(), folder.c_str());
     return folder.string();
   }
+  if (std::error_code error; fs::exists(folder, error) && !fs::is_empty(folder, error))
+    throw InputError(folder.string(), fmt::format("holds a recording that did not end, expected --{} {} if it is long "
+                                                  "enough, else that it is removed",
+                                                  name, folder.string()));
   RecordOptions recording;
   recording.camera = options.camera, recording.robot = options.robot, recording.rig = options.rig;
   recording.joint_limits = options.joint_limits, recording.out = folder.string();
@@ -318,6 +346,8 @@ void add_calibrate_all(Command parent, Run& run_later) {
   command.add_option("--joint-limits", options->joint_limits, "For --enable-motion: YAML of the arm's joints");
   command.add_option("--report", options->report, "The check's HTML page with figures");
   command.add_option("--instrument", options->instrument, "Its name, where the rig has several");
+  add_image_topic_option(command, options->image_topic);
+  add_joint_topic_option(command, options->joint_topic);
   add_video_options(command, *options);
   command.add_flag("--deinterlace", options->deinterlace, "For interlaced video: measure the field of the even rows");
   command.add_option("--fps", options->fps, "Frames per second of folders of images").number_between(0.001, 1000.0);

@@ -89,8 +89,8 @@ void write_results(const CalibrateCameraOptions& options, std::optional<Rig> rig
     std::printf("camera: %s\n", place.c_str());
   }
   if (!rig) return;
-  rig->camera = camera;
-  write_file(options.rig_out(), rig_yaml(*rig));
+  rig->camera = camera, rig->camera_file.clear();
+  write_file(options.rig_out(), rig_yaml(*rig, options.rig_out()));
   std::printf("rig: %s\n", options.rig_out().c_str());
 }
 

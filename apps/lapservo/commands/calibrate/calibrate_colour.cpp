@@ -36,11 +36,10 @@ int calibrate_colour(const CalibrateColourOptions& options) {
   AtomicFile out(options.out);
   watch_for_interrupts();
 
-  const bool live = source->kind() == FrameSource::Kind::live;
   const ColourMeasurement measured = measure_colour(rig, index, {*source, options.input, options.deinterlace},
                                                     options.replace_response, watched_job());
   const ColourCalibration& calibration = measured.calibration;
-  if (live || !measured.read.stopped) say_complaint(options.input, measured.read.complaint);
+  if (!measured.read.stopped) say_complaint(options.input, measured.read.complaint);
   if (!calibration.refusal.empty()) return refuse_calibration(options, calibration.refusal);
   print(instrument, calibration, measured.frames);
   out.stream() << rig_yaml(with_colour(rig, index, calibration), options.out);
