@@ -77,10 +77,12 @@ class Operator : public RunObserver {
       state_ = state;
       std::printf("%.2f s  %s\n", time_s, state.empty() ? "armed" : state.c_str());
     }
-    if (time_s > 9) largest_error_ = largest_error_.cwiseMax(tick.decision.control.error.cwiseAbs());
+    if (time_s > 9 && tick.decision.control.estimate)
+      sees_ = true, largest_error_ = largest_error_.cwiseMax(tick.decision.control.error.cwiseAbs());
     return true;
   }
   Eigen::Vector4d largest_error_ = Eigen::Vector4d::Zero(), moved_while_held_ = Eigen::Vector4d::Constant(1);
+  bool sees_ = false;  // the marker, in the last second
 
  private:
   SecondOrderArm& arm_;
@@ -109,7 +111,7 @@ int main(int argc, char** argv) {
   run(supervisor, camera, clock, config, sinusoids(paper_sinusoids()), 10, person);
   const Eigen::Vector4d &e = person.largest_error_, &moved = person.moved_while_held_;
   const bool held = (moved.array().abs() < Eigen::Array4d(1e-4, 1e-4, 5e-5, 1e-4)).all();
-  const bool converged = e[0] < 0.005 && e.tail<3>().maxCoeff() < 1;
+  const bool converged = person.sees_ && e[0] < 0.005 && e.tail<3>().maxCoeff() < 1;
   std::printf("%s; %s; largest errors in the last second: s %.2f mrad; r %.2f, l %.2f, d %.2f px\n",
               converged ? "converged" : "did not converge", held ? "held until the start" : "moved without a start",
               1000 * e[0], e[1], e[2], e[3]);

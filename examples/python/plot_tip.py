@@ -25,7 +25,8 @@ def table(path, *columns):
         return np.array([[float(row[column] or "nan") for column in columns] for row in csv.DictReader(file)])
 
 
-camera_from_rcm = lapservo.Rig.load(run / "true_rig.yaml").instruments[0].camera_from_rcm
+true_rig = run / "true_rig.yaml"  # where it differs from the loop's
+camera_from_rcm = lapservo.Rig.load(true_rig if true_rig.exists() else run / "rig.yaml").instruments[0].camera_from_rcm
 time_s, theta, phi, rho_m = table(run / "log.csv", "time_s", "true_theta_rad", "true_phi_rad", "true_rho_m").T
 axis = np.stack([np.sin(phi) * np.cos(theta), np.sin(phi) * np.sin(theta), np.cos(phi)])
 tip = camera_from_rcm[:3, :3] @ ((rho_m + tip_m) * axis) + camera_from_rcm[:3, 3:]

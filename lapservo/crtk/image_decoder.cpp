@@ -64,7 +64,8 @@ std::string shown(std::string text) {
 BadImage bad_encoding(const std::string& encoding) {
   if (encoding == "mono8" || encoding == "mono16")
     return {encoding + " has no colours, by which the marker is found: publish bgr8, rgb8, yuv422 or bayer_*"};
-  return {"encoding " + shown(encoding) + ", expected bgr8, rgb8, bgra8, rgba8, bgr16, rgb16, yuv422, nv12 or bayer_*"};
+  return {"encoding " + shown(encoding) +
+          ", expected bgr8, rgb8, bgra8, rgba8, bgr16, rgb16, yuv422, yuv422_yuy2, nv12 or bayer_*"};
 }
 
 // By the matrix of its height; chroma lies on the left of each two pixels, as cameras send it. Chroma of nv12 lies in

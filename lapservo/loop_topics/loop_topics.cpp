@@ -119,20 +119,23 @@ LoopTopics::LoopTopics(Transport& transport, const Rig& rig, const FrameNames& f
       overlay_(transport.compressed_image_publisher(topic(rig, "overlay/compressed"))),
       started_s_{never, never},
       other_loop_s_(never) {
-  thread_ = std::thread([this] { draw(); });
   subscriptions_.push_back(transport.subscribe_joints(topic(rig, "desired"), [this](JointMessage&&) {
     const std::lock_guard lock(mutex_);
     other_loop_s_ = SteadyClock().now_s();
   }));
-  if (!hears) return;
+  if (hears) hear_wishes();
+  thread_ = std::thread([this] { draw(); });
+}
+
+void LoopTopics::hear_wishes() {
   subscriptions_.push_back(
-      transport.subscribe_strings(topic(rig, "command"), [this](StringMessage&& command) { hear(command); }));
+      transport_.subscribe_strings(topic(rig_, "command"), [this](StringMessage&& command) { hear(command); }));
   subscriptions_.push_back(
-      transport.subscribe_joints(topic(rig, "set_point"), [this](JointMessage&& set_point) { hear(set_point); }));
+      transport_.subscribe_joints(topic(rig_, "set_point"), [this](JointMessage&& set_point) { hear(set_point); }));
   subscriptions_.push_back(
-      transport.subscribe_places(topic(rig, "tip_goal"), [this](PlaceMessage&& tip_goal) { hear(tip_goal); }));
-  subscriptions_.push_back(transport.subscribe_trajectories(
-      topic(rig, "trajectory"), [this](TrajectoryMessage&& trajectory) { hear(trajectory); }));
+      transport_.subscribe_places(topic(rig_, "tip_goal"), [this](PlaceMessage&& tip_goal) { hear(tip_goal); }));
+  subscriptions_.push_back(transport_.subscribe_trajectories(
+      topic(rig_, "trajectory"), [this](TrajectoryMessage&& trajectory) { hear(trajectory); }));
 }
 
 LoopTopics::~LoopTopics() {
@@ -149,8 +152,8 @@ void LoopTopics::publish(const ControlTick& tick, const std::string& state) {
   // The image's time, on the clock of those who listen.
   const double seen_s = stamp_s - (tick.input.time_s - tick.seen->image.time_s);
   publish_observation(tick, seen_s);
-  if (stamp_s < next_drawing_s_) return;
-  next_drawing_s_ = stamp_s + between_drawings_s;
+  if (tick.input.time_s < next_drawing_s_) return;
+  next_drawing_s_ = tick.input.time_s + between_drawings_s;
   to_draw_.push_over_oldest({seen_s, tick.seen->image.bgr, tick.seen->observations, tick.seen->camera_from_rcm});
 }
 
@@ -195,9 +198,9 @@ void LoopTopics::publish_observation(const ControlTick& tick, double stamp_s) {
 }
 
 void LoopTopics::publish_state(const ControlTick& tick, const std::string& state, double stamp_s) {
-  if (state == last_state_ && stamp_s < next_state_s_) return;
+  if (state == last_state_ && tick.input.time_s < next_state_s_) return;
   last_state_ = state;
-  next_state_s_ = stamp_s + between_states_s;
+  next_state_s_ = tick.input.time_s + between_states_s;
   DiagnosticMessage message;
   message.stamp_s = stamp_s;
   message.level = state.empty() ? DiagnosticMessage::Level::ok : DiagnosticMessage::Level::warning;
@@ -209,7 +212,7 @@ void LoopTopics::publish_state(const ControlTick& tick, const std::string& state
                     {"limited", control.limited ? "true" : "false"},
                     {"delay_s", fmt::format("{:.4f}", control.delay_s)},
                     {"registration", std::to_string(tick.decision.registration)}};
-  for (std::size_t i = 0; i < FeatureVector::size; ++i)
+  for (std::size_t i = 0; control.estimate && i < FeatureVector::size; ++i)
     message.values.emplace_back(fmt::format("error_{}", FeatureVector::names[i]),
                                 fmt::format("{:.6g}", control.error[static_cast<Eigen::Index>(i)]));
   diagnostics_(message);

@@ -61,6 +61,7 @@ class LoopTopics {
   void publish_numbers(const ControlTick& tick, double stamp_s);
   void publish_observation(const ControlTick& tick, double stamp_s);
   void publish_state(const ControlTick& tick, const std::string& state, double stamp_s);
+  void hear_wishes();
   void hear(const StringMessage& command);
   void hear_start(const StringMessage& command, bool force);
   void hear(const JointMessage& set_point);

@@ -263,7 +263,9 @@ Controller make_controller(const Rig& rig, const std::string& mode, const std::o
   if (delay_s) config.observer.delay_s = *delay_s;
   if (joint_limits) config.limits = joint_limits_of(*joint_limits, rig);
   config.has_joint_limits = joint_limits.has_value();
+  const JointLimits of_arm = config.limits;
   if (path) static_cast<ControllerConfig&>(config) = load_controller(*path, config);
+  if (joint_limits) config.limits = both_limits(config.limits, of_arm);
   static_cast<ControllerConfig&>(config) = checked(config);
   return config;
 }

@@ -136,6 +136,13 @@ void Command::footer(const std::string& text) {
   app_->footer(text);
 }
 
+std::vector<std::string> Command::given() const {
+  std::vector<std::string> names;
+  for (const CLI::Option* option : app_->get_options())
+    if (option->count() > 0) names.push_back(option->get_name());
+  return names;
+}
+
 void Command::runs(Run& run_later, Run run) {
   app_->callback([&run_later, run = std::move(run)] { run_later = run; });
 }

@@ -57,6 +57,8 @@ class Command {
   void add_flag(const std::string& names, bool& value, const std::string& help);
   /// The end of --help: an example.
   void footer(const std::string& text);
+  /// The options that the command line gives, as "--rig"; after it was parsed.
+  std::vector<std::string> given() const;
   /// Sets `run_later` when the command line names this subcommand.
   void runs(Run& run_later, Run run);
 

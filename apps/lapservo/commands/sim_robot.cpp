@@ -9,6 +9,9 @@
 #include <thread>
 #include <vector>
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include "apps/lapservo/cli/interrupt.h"
 #include "apps/lapservo/cli/subcommands.h"
 #include "apps/lapservo/inputs/transports.h"
@@ -91,6 +94,11 @@ int run(const SimRobotOptions& options) {
     std::printf("--instrument %s ", instrument.c_str());
   std::printf("--enable-motion --joint-limits %s moves it, Ctrl-C ends this\n",
               joint_limits_beside(options.rig).c_str());
+  if (const Joints usual = default_joints(); !rig.instruments.front().joints)
+    fmt::print(
+        "{} has no joints, which servo needs: add to its instrument `joints: {{names: [{}], sign: [{}], offset: "
+        "[{}]}}`\n",
+        options.rig, fmt::join(usual.names, ", "), fmt::join(usual.sign, ", "), fmt::join(usual.offset, ", "));
   std::fflush(stdout);
   SteadyClock clock;
   const double begin_s = clock.now_s();

@@ -191,6 +191,8 @@ void say_moved(const TrackOptions& options, const Frame& frame) {
 std::unique_ptr<LiveFrames> open_topic(const TrackOptions& options, const RigByFrame& rigs) {
   if (!rigs.camera() && (names_topic(options.input) || options.input.starts_with("gst:")))
     throw InputError("--rig", "is missing, expected a rig's YAML: live images have none beside them");
+  if (names_topic(options.input) && !(options.eye + options.side_by_side + options.image_topic).empty())
+    throw InputError("--eye, --side-by-side, --image-topic", "are of recordings, expected none with a topic");
   return names_topic(options.input) ? std::make_unique<LiveFrames>(options.input, *rigs.camera()) : nullptr;
 }
 

@@ -30,9 +30,8 @@ std::optional<std::string> ChangingGoal::follow(const ControlTick& tick, double 
 std::optional<std::string> ChangingGoal::result(const ServoDecision& decision, double time_s) {
   if (!refusal_.valid() || refusal_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return std::nullopt;
   const std::string refusal = refusal_.get();
-  if (wanted_) return std::nullopt;
   if (asked_.registration != decision.registration) {
-    wanted_ = asked_;  // it was checked for an earlier place of the endoscope
+    if (!wanted_) wanted_ = asked_;  // it was checked for an earlier place of the endoscope
     return std::nullopt;
   }
   if (!refusal.empty()) return "refused: " + refusal;

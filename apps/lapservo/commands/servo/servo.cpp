@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -124,9 +125,10 @@ int simulate(const ServoOptions& options) {
   return watcher.commit_log() && watcher.summary().succeeded(options.strict) ? 0 : 1;
 }
 
-int replay_log(const ServoOptions& options) {
-  if (!options.rig.empty())
-    throw InputError("--rig", "is " + options.rig + ", expected none: the rig beside the log counts");
+int replay_log(const ServoOptions& options, const std::vector<std::string>& given) {
+  for (const std::string& name : given)
+    if (name != "--replay")
+      throw InputError(name, "is given, expected none with a log: rig.yaml and controller.yaml beside it count");
   const fs::path log = options.replay, folder = log.parent_path();
   const std::string rig_file = (folder / "rig.yaml").string();
   Rig rig = first_instrument(load_rig(rig_file), rig_file);
@@ -157,7 +159,21 @@ void check_operator_present(const ServoOptions& options) {
     throw InputError("--operator-present", "is " + source + ", which the simulator does not hear, expected page");
 }
 
-int run(const ServoOptions& options) {
+// Options that would be ignored.
+void refuse_idle(const ServoOptions& options, const std::vector<std::string>& given) {
+  const auto refuse = [&](const std::vector<std::string>& names, const char* why) {
+    for (const std::string& name : given)
+      if (std::find(names.begin(), names.end(), name) != names.end()) throw InputError(name, why);
+  };
+  if (options.replay.empty())
+    refuse({"--image-topic", "--joint-topic", "--eye", "--side-by-side"},
+           "is of a recording, expected --replay with it");
+  if (options.robot != "sim")
+    refuse({"--start", "--seed", "--latency-ms", "--registration-error", "--hide"},
+           "is of the simulator, expected --robot sim with it");
+}
+
+int run(const ServoOptions& options, const std::vector<std::string>& given) {
   options.web.check();
   check_operator_present(options);
   const bool recorded = !bag_of(options.replay).empty();
@@ -167,9 +183,10 @@ int run(const ServoOptions& options) {
     throw InputError("--endoscope", "is " + options.endoscope + ", expected none without an arm of a topic");
   if (!options.replay.empty() && options.enable_motion)
     throw InputError("--enable-motion", "moves nothing that was recorded, expected none with --replay");
-  if (!options.replay.empty() && !recorded) return replay_log(options);
+  if (!options.replay.empty() && !recorded) return replay_log(options, given);
   if (options.rig.empty())
     throw InputError("--rig", "is missing, expected a rig's YAML, for example configs/paper.yaml");
+  refuse_idle(options, given);
   if (recorded) return decide_on_recording(options);
   if (options.robot == "sim" && !options.camera.empty())
     throw InputError("--camera",
@@ -320,7 +337,7 @@ void add_servo(Command app, Run& run_later) {
       "  lapservo servo --rig configs/paper.yaml --robot ros2:PSM1 --camera /dev/video0 --web\n"
       "  lapservo servo --replay run/log.csv\n"
       "  lapservo servo --replay swing.bag --rig rig.yaml --out decided");
-  command.runs(run_later, [options] { return run(*options); });
+  command.runs(run_later, [options, command] { return run(*options, command.given()); });
 }
 
 }  // namespace lapservo::app

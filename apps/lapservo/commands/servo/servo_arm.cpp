@@ -206,6 +206,7 @@ int steer_arm(const ServoOptions& options) {
                           options.endoscope, wait_s);
   if (ended_by_page()) return end_by_page();
   if (topics.name_is_in_use()) throw InputError("--rig", name_in_use(rig));
+  if (interrupted()) missing = "stopped";
   if (!missing.empty()) {
     std::fprintf(stderr, "lapservo: %s\n", missing.c_str());
     return 1;

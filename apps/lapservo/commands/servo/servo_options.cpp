@@ -47,7 +47,9 @@ ControllerConfig controller_of(const ServoOptions& options, const Rig& rig) {
     config.observer.delay_s = *delay_ms / 1000;
   }
   if (!options.joint_limits.empty()) config.limits = limits_of(options, rig);
+  const JointLimits of_arm = config.limits;
   if (!options.controller.empty()) config = load_controller(options.controller, config);
+  if (!options.joint_limits.empty()) config.limits = both_limits(config.limits, of_arm);
   return checked(config);
 }
 
