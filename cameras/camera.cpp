@@ -10,7 +10,7 @@
 namespace lapservo::internal {
 namespace {
 
-constexpr std::string_view pipeline = "gst:", device = "/dev/video";
+constexpr std::string_view pipeline = "gst:", device = "/dev/video", by_name = "/dev/v4l/";
 
 bool is_number(const std::string& text) {
   return !text.empty() && text.size() < 4 && text.find_first_not_of("0123456789") == std::string::npos;
@@ -19,7 +19,7 @@ bool is_number(const std::string& text) {
 }  // namespace
 
 bool names_camera(const std::string& text) {
-  if (text.starts_with(pipeline) || text.starts_with(device)) return true;
+  if (text.starts_with(pipeline) || text.starts_with(device) || text.starts_with(by_name)) return true;
   std::error_code error;
   return is_number(text) && !std::filesystem::exists(text, error);
 }

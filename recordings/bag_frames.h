@@ -22,6 +22,8 @@ class BagFrames : public FrameSource {
   std::optional<int> frame_count() const override;
   double frames_per_second() const override;
   std::string remark() const override { return bag_->remark(); }
+  /// By JPEG.
+  bool is_lossy() const override { return is_jpeg_; }
   std::string complaint() const override;
   const std::string& topic() const { return topic_.name; }
   std::optional<double> first_stamp_s() const override { return first_->time_s; }
@@ -39,6 +41,7 @@ class BagFrames : public FrameSource {
   StampedMessages messages_;
   std::optional<Picture> first_;
   int index_ = 0, unreadable_ = 0;
+  bool is_jpeg_ = false;        // the first was
   std::string why_unreadable_;  // the first was
 };
 

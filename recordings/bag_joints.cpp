@@ -21,12 +21,12 @@ std::optional<std::array<double, 4>> chosen(const JointMessage& message, const J
                                             const std::string& source) {
   if (const std::string twice = repeated_joint(joints, message.names); !twice.empty())
     throw InputError(source, fmt::format("names the joint {} twice in a message, expected each name once", twice));
+  const auto places = find_joints(joints, message.names);
+  if (!places) return std::nullopt;
   std::array<double, 4> values{};
   for (std::size_t i = 0; i < values.size(); ++i) {
-    const auto found = std::find(message.names.begin(), message.names.end(), joints.names[i]);
-    const auto place = static_cast<std::size_t>(found - message.names.begin());
-    if (place >= std::min(message.names.size(), message.positions.size())) return std::nullopt;
-    values[i] = message.positions[place];
+    if ((*places)[i] >= message.positions.size()) return std::nullopt;
+    values[i] = message.positions[(*places)[i]];
   }
   return values;
 }

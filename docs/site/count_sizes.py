@@ -7,9 +7,9 @@ import sys
 from pathlib import Path
 
 # folder: lines, chosen numbers
-LIMITS = {"lapservo/vision": (10716, 433)}
+LIMITS = {"lapservo/vision": (10716, 432)}
 TESTS = ["*_test.cpp", "*/test_*.cpp", "*/test_*.h", "lapservo/testing/*", "acceptance/*.cpp", "acceptance/*.h", "fuzz/*.cpp", "fuzz/*.h"]
-MOST_TEST_LINES = 38342
+MOST_TEST_LINES = 38368
 
 NOT_CODE = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\])*"|\'(?:\\.|[^\'\\])\'|^#[^\n]*', re.S | re.M)
 NUMBER = re.compile(r"(?<![\w.])(?:\d[\d']*\.?\d*|\.\d+)(?:[eE][+-]?\d+)?[fFuUlL]*(?![\w.])")

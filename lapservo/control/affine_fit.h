@@ -20,7 +20,6 @@ class AffineFit {
   };
 
   void add(const Eigen::Vector4d& x, const ImageVector& y);
-  int samples() const { return samples_; }
   /// nullopt when the inputs do not span all four directions.
   std::optional<Solution> solve() const;
 

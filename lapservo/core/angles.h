@@ -29,4 +29,9 @@ inline double wrap_two_pi(double angle_rad) {
   return wrapped >= two_pi ? 0.0 : wrapped;
 }
 
+/// Size of the angle between two hues.
+inline double hue_gap_deg(double a_deg, double b_deg) {
+  return std::abs(std::remainder(a_deg - b_deg, 360.0));
+}
+
 }  // namespace lapservo::internal

@@ -23,8 +23,10 @@ class FirstSender {
     source_ = source, heard_s_ = arrival_s;
     return another ? Verdict::counts_anew : Verdict::counts;
   }
-  /// Another message shows that the sender is there.
-  void is_there(double time_s) { heard_s_ = time_s; }
+  /// Another topic's message of this source came.
+  void is_there(std::uint64_t source, double arrival_s) {
+    if (source_ == source) heard_s_ = arrival_s;
+  }
   /// Whether a message of another one came within the last 0.5 s.
   bool has_rival(double time_s) const { return time_s - other_s_ <= silence_s; }
 

@@ -71,10 +71,10 @@ Interlock::Interlock(const InterlockConfig& config)
     : config_(config), measured_clock_(config.max_age_s), setpoint_clock_(config.max_age_s) {}
 
 // Places of the four joints; nullopt, and counted, for an unusable message.
-std::optional<Interlock::Places> Interlock::places_in(const JointMessage& message) {
+std::optional<Interlock::Places> Interlock::places_in(const JointMessage& message, const char* topic) {
   const bool sized = message.names.size() <= max_joints && message.names.size() == message.positions.size();
   const auto places = sized ? find_joints(config_.joints, message.names) : std::nullopt;
-  complaint_ = sized && !places ? unfit_joints(config_.joints, message.names) : "";
+  complaints_[topic] = sized && !places ? unfit_joints(config_.joints, message.names) : "";
   if (!places) ++counts_.malformed;
   return places;
 }
@@ -100,6 +100,12 @@ void Interlock::begin_anew(double arrival_s) {
   blocked_s_ = arrival_s;
 }
 
+std::string Interlock::complaint() const {
+  for (const auto& [topic, why] : complaints_)
+    if (!why.empty()) return topic + " " + why;
+  return {};
+}
+
 std::optional<double> Interlock::stamped(StampClock& clock, const JointMessage& message, double arrival_s) {
   const StampClock::Reading measured = clock.read(message.stamp_s, arrival_s);
   if (measured.verdict == StampVerdict::fresh) return measured.time_s;
@@ -120,8 +126,8 @@ Eigen::Vector4d Interlock::q_of(const JointMessage& message, const Places& place
 
 void Interlock::on_measured(const JointMessage& message, double arrival_s) {
   if (!is_of(measured_sender_, message.source, arrival_s)) return;
-  state_sender_.is_there(arrival_s);  // its messages are rare
-  const auto places = places_in(message);
+  state_sender_.is_there(message.source, arrival_s);  // its messages are rare
+  const auto places = places_in(message, "measured_js");
   if (!places) return;
   const auto time_s = stamped(measured_clock_, message, arrival_s);
   if (!time_s) return;
@@ -137,7 +143,7 @@ void Interlock::on_measured(const JointMessage& message, double arrival_s) {
 
 void Interlock::on_setpoint(const JointMessage& message, double arrival_s) {
   if (!is_of(setpoint_sender_, message.source, arrival_s)) return;
-  const auto places = places_in(message);
+  const auto places = places_in(message, "setpoint_js");
   if (!places || !all_finite(message.positions)) return;
   const auto time_s = stamped(setpoint_clock_, message, arrival_s);
   if (!time_s) return;
@@ -156,7 +162,8 @@ void Interlock::on_setpoint(const JointMessage& message, double arrival_s) {
 }
 
 void Interlock::on_operating_state(const OperatingStateMessage& message, double arrival_s) {
-  if (!is_of(state_sender_, message.source, arrival_s)) return;
+  // Another program's state may be this arm's, too: the one before does not count then.
+  if (!is_of(state_sender_, message.source, arrival_s)) return operating_state_.reset();
   operating_state_ = message;
   watch(arrival_s);
 }
@@ -369,6 +376,18 @@ void Interlock::on_suspended(double now_s) {
   stop(Blocked::loop_late);
 }
 
+// After a pause the arm may not have what was sent last: from where it is, the next setpoint would be a step.
+bool Interlock::is_lost_on_its_way(double now_s) {
+  constexpr double lost_s = 0.7;
+  if (phase_ != Phase::idle || !continues_ || lies_between(setpoint_->q, last_, last_)) return false;
+  if (now_s - sent_.back().time_s > lost_s) {
+    untold_ = Blocked::displaced;
+    blocked_s_ = now_s;
+    stop(Blocked::displaced);
+  }
+  return true;
+}
+
 std::optional<std::vector<double>> Interlock::tick(double now_s) {
   // An arm that nobody watched may be elsewhere: it is not even braked.
   if (now_s - std::exchange(ticked_s_, now_s).value_or(now_s) > unwatched_s) on_suspended(now_s);
@@ -382,7 +401,7 @@ std::optional<std::vector<double>> Interlock::tick(double now_s) {
     if (velocity_.isZero()) phase_ = Phase::idle;
     return send(now_s);
   }
-  if (!path_) return std::nullopt;
+  if (!path_ || is_lost_on_its_way(now_s)) return std::nullopt;
   // While the arm could not be moved by us it may have been by others.
   if (phase_ == Phase::idle && !(setpoint_->arrival_s > blocked_s_)) return std::nullopt;
   if (phase_ != Phase::following) start(now_s);

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <map>
 #include <optional>
 #include <string>
 #include <utility>
@@ -91,8 +92,8 @@ class Interlock {
 
   /// Joint velocities to the positions that tick() returned last: from those before, a period earlier; zero at rest.
   std::vector<double> velocities() const;
-  /// Why the last joint state's joints are not the rig's; empty when they are.
-  const std::string& complaint() const { return complaint_; }
+  /// Why the joints of the last measured_js, or else of the last setpoint_js, are not the rig's; empty when they are.
+  std::string complaint() const;
   /// Names of the arm's joints, as in its setpoints.
   const std::vector<std::string>& names() const { return names_; }
   /// The setpoint of theta, phi, rho, psi that was sent last, or withheld; nullopt while none is wanted.
@@ -114,7 +115,7 @@ class Interlock {
 
   using Places = std::array<std::size_t, 4>;
   bool is_of(FirstSender& sender, std::uint64_t source, double arrival_s);
-  std::optional<Places> places_in(const JointMessage& message);
+  std::optional<Places> places_in(const JointMessage& message, const char* topic);
   std::optional<double> stamped(StampClock& clock, const JointMessage& message, double arrival_s);
   Eigen::Vector4d q_of(const JointMessage& message, const Places& places) const;
   Blocked blocked(double now_s) const;
@@ -122,6 +123,7 @@ class Interlock {
   void stop(Blocked why);
   void begin_anew(double arrival_s);
   void watch_rest(double now_s);
+  bool is_lost_on_its_way(double now_s);
   void start(double now_s);
   struct Interval {
     double begin_s = 0, end_s = 0;
@@ -142,7 +144,7 @@ class Interlock {
   InterlockCounts counts_;
   StampClock measured_clock_, setpoint_clock_;
   FirstSender measured_sender_, setpoint_sender_, state_sender_;
-  std::string complaint_;
+  std::map<std::string, std::string> complaints_;  // by topic
   std::optional<Reading> measured_, setpoint_;
   ReadingBuffer readings_;
   bool finite_ = true;

@@ -5,6 +5,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "lapservo/core/printable.h"
+
 namespace lapservo::internal {
 namespace {
 
@@ -84,12 +86,22 @@ std::string repeated_joint(const Joints& joints, const std::vector<std::string>&
   return repeated.empty() && other ? repeated_of(*other, names) : repeated;
 }
 
+namespace {
+
+std::string printed(std::vector<std::string> names) {
+  for (std::string& name : names) name = printable(name);
+  return fmt::format("{}", fmt::join(names, ", "));
+}
+
+}  // namespace
+
 std::string unfit_joints(const Joints& joints, const std::vector<std::string>& names) {
   if (const std::string twice = repeated_joint(joints, names); !twice.empty())
-    return fmt::format("joints are {}: {} stands there twice, expected each name once", fmt::join(names, ", "), twice);
-  if (names.empty()) return "measured_js names no joints: enable and home the arm";
+    return fmt::format("has the joints {}: {} stands there twice, expected each name once", printed(names),
+                       printable(twice));
+  if (names.empty()) return "names no joints: enable and home the arm";
   const auto other = other_names(joints);
-  return fmt::format("joints are {}, expected {}{}{}", fmt::join(names, ", "), fmt::join(joints.names, ", "),
+  return fmt::format("has the joints {}, expected {}{}{}", printed(names), fmt::join(joints.names, ", "),
                      other ? fmt::format(" or {}", fmt::join(*other, ", ")) : "",
                      has_no_tool(names) ? ". The arm knows no instrument: name it on set_tool_type" : "");
 }

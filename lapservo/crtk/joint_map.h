@@ -31,7 +31,7 @@ std::vector<double> wrist_in(const JointMessage& message, const std::vector<std:
 /// The first of the rig's joints, by either of a PSM's names, that stands in a message twice; empty where none does.
 std::string repeated_joint(const Joints& joints, const std::vector<std::string>& names);
 
-/// Why it finds none: the names that came and those that are expected.
+/// Why it finds none: the names that came and those that are expected, after the topic's name.
 std::string unfit_joints(const Joints& joints, const std::vector<std::string>& names);
 
 }  // namespace lapservo::internal

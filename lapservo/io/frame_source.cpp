@@ -116,7 +116,6 @@ class VideoSource : public FrameSource {
   int index_ = 0;
 };
 
-// Frames have the times at which they were requested.
 class StreamSource : public FrameSource {
  public:
   StreamSource(const std::string& name, const VideoReading& reading)
@@ -127,9 +126,7 @@ class StreamSource : public FrameSource {
   std::optional<Frame> next() override {
     auto image = first_ ? std::exchange(first_, std::nullopt) : stream_.next();
     if (!image) return std::nullopt;
-    const auto now = std::chrono::steady_clock::now();
-    if (index_ == 0) start_ = now;
-    Frame frame{std::move(image->bgr), index_++, std::chrono::duration<double>(now - start_).count(), {}, {}};
+    Frame frame{std::move(image->bgr), index_++, image->time_s, {}, {}};
     if (image->damaged) frame.flaw = Status::damaged;
     return frame;
   }
@@ -139,12 +136,12 @@ class StreamSource : public FrameSource {
   std::string remark() const override { return stream_.remark(); }
   bool is_srgb() const override { return stream_.is_srgb(); }
   bool is_lossy() const override { return stream_.is_lossy(); }
+  std::string complaint() const override { return stream_.complaint(); }
 
  private:
   VideoReader stream_;
   std::optional<VideoReader::Image> first_;
   int index_ = 0;
-  std::chrono::steady_clock::time_point start_;
 };
 
 Pictures pictures_in(const fs::path& folder) {

@@ -90,8 +90,6 @@ FeatureMapResult feature_map(const ImageModel& model, const JointVector& q) {
   point.jacobian.row(3) = length_rate(inner, rates[2] - rates[0]);
   point.ends_jacobian << rates[0], rates[3];
   point.tau_rad = line->tau_rad;
-  point.facing_azimuth_rad = line->facing_azimuth_rad;
-  point.points_in_camera_m = line->points_in_camera_m;
   point.ideal_px = e;
   return {Undefined::none, point};
 }

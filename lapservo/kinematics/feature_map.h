@@ -37,9 +37,7 @@ struct FeaturePoint {
   Eigen::Matrix4d jacobian = Eigen::Matrix4d::Zero();
   /// d(u, v of e0, u, v of e3)/dq, px by the same columns: what keeps the marker within the image.
   Eigen::Matrix4d ends_jacobian = Eigen::Matrix4d::Zero();
-  double tau_rad = 0;                                   ///< marker azimuth on the centre line, [0, 2 pi)
-  double facing_azimuth_rad = 0;                        ///< gamma
-  std::array<Eigen::Vector3d, 4> points_in_camera_m{};  ///< e0..e3 on the facing generatrix
+  double tau_rad = 0;  ///< marker azimuth on the centre line, [0, 2 pi)
   std::array<Eigen::Vector2d, 4> ideal_px{};
 };
 

@@ -16,10 +16,6 @@ constexpr double min_diameter_m = 0.5e-3, max_diameter_m = 0.1;
 constexpr double max_band_m = 0.5, max_askew_m = 0.02, max_gap_rad = 1.5;
 constexpr double min_hue_gap_deg = 40;  // closer hues blend under white balance, blur and smoke
 
-double hue_gap_deg(double a_deg, double b_deg) {
-  return std::abs(std::remainder(a_deg - b_deg, 360.0));
-}
-
 FieldProblem problem(const std::string& field, double value, const std::string& expected) {
   return {field, fmt::format("{:g}", value), expected};
 }

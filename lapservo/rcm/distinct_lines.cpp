@@ -67,7 +67,9 @@ class Positions {
 
 }  // namespace
 
-std::vector<LineObservation> distinct_lines(std::span<const LineObservation> lines, double apart_px, std::size_t most) {
+std::vector<LineObservation> distinct_lines(std::span<const LineObservation> lines) {
+  constexpr std::size_t most = 1000;
+  double apart_px = 2;
   std::vector<Position> positions;
   for (const LineObservation& line : lines) {
     if (!is_usable(line)) continue;

@@ -16,7 +16,7 @@ Blocked arm_of(const JointState& state, double now_s, double max_age_s) {
   return now_s - state.time_s <= max_age_s ? Blocked::none : Blocked::old_joint_states;
 }
 
-constexpr internal::Words<Blocked, 16> remedies{
+constexpr internal::Words<Blocked, 18> remedies{
     {{Blocked::no_joint_states, "check the arm's namespace and the names of its joints"},
      {Blocked::old_joint_states, "the arm is silent: restore its joint states"},
      {Blocked::non_finite_joints, "check the arm"},
@@ -32,6 +32,8 @@ constexpr internal::Words<Blocked, 16> remedies{
      {Blocked::second_camera, "another program publishes the camera's images, too or instead: check whose they are"},
      {Blocked::second_reader, "other nodes than the arm's read servo_jp: end them, or allow their number"},
      {Blocked::no_reader, "nobody reads servo_jp: start the arm"},
+     {Blocked::displaced, "the arm is not where it was sent: look what moved or blocked it, or lost the setpoints"},
+     {Blocked::loop_late, "the loop stood still: look where the arm is"},
      {Blocked::operator_absent, "press what says that the operator is present"}}};
 
 std::string names_of(const Commanders& holders) {

@@ -136,6 +136,9 @@ std::vector<Observation> Tracker::track(const cv::Mat& image_bgr) && {
 void Tracker::set_registration(std::size_t instrument, const Rigid3& camera_from_rcm,
                                const Eigen::Matrix<double, 6, 6>& covariance) {
   Instrument& moved = state_->rig.instruments.at(instrument);
+  if (!camera_from_rcm.translation.allFinite() || !camera_from_rcm.rotation.coeffs().allFinite() ||
+      !covariance.allFinite())
+    throw InputError("tracker", "camera_from_rcm", "not finite", "finite numbers");
   moved.camera_from_rcm = camera_from_rcm;
   moved.registration_covariance = covariance;
   state_->surface.set_registration(instrument, moved);

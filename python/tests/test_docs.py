@@ -24,7 +24,7 @@ ELSEWHERE = {"tutorial.md": ("debian/tests/pages", ["sh", "sh", "yaml", "sh", "s
              "quickstart.md": ("debian/tests/pages", ["text", "sh", "python", "cpp", "sh", "sh"])}
 
 #: Blocks that are no code, by page and first line.
-TEXT = {("README.md", "lapservo/core geometry marker kinematics rcm rig   values: no images, no control"): "the folders",
+TEXT = {("README.md", "lapservo/core geometry marker kinematics rcm tool rig   values: no images, no control"): "the folders",
         ("README.md", "@software{lapservo,"): "BibTeX",
         ("calibration.md", "file,column,row,wrist_pitch,wrist_yaw"): "a table of touches, as calibrate_tip_test writes one",
         ("tip_goals.md", "--tip: can't be followed at 0.00 s: limits.upper rho_m 0.2: needs 0.22; the nearest that can be reached is ..."): "a message",

@@ -147,8 +147,19 @@ Instrument chosen(const RigOptions& options, const Rig& rig) {
   throw InputError("--instrument", "name", options.instrument, "an instrument of " + options.rig);
 }
 
+// A sheet that is drawn by what was measured on a print repeats that print's errors, and the camera's hues as inks.
+void warn_of_measured(const Marker& marker) {
+  const MarkerSigmas& sigmas = marker.sigmas;
+  if (sigmas.bands_upper_m || sigmas.hues_deg || marker.gap_rad > 0)
+    std::fprintf(
+        stderr,
+        "lapservo: warning: the rig's bands or hues are measured ones: print the marker as it was designed, from "
+        "the rig of before the calibration\n");
+}
+
 int run_print(const RigOptions& options) {
   const Instrument instrument = chosen(options, load_rig(options.rig));
+  warn_of_measured(instrument.marker);
   if (!options.out.ends_with(".svg") && !options.out.ends_with(".pdf"))
     throw InputError("--out", "name", options.out, "one that ends in .pdf or .svg");
   write_print_sheet(options.out, instrument.name, instrument.marker, options.paper == "a4" ? Paper::a4 : Paper::letter,

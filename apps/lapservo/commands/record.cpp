@@ -218,7 +218,10 @@ std::string told(const RecordedCounts& counts) {
 }
 
 // `unpublished`: see Transports.
-std::string missing(const std::string& what, const std::string& unpublished) {
+std::string missing(const std::string& what, const RecordedCounts& counts, const std::string& unpublished) {
+  if (counts.unstamped > 0)
+    return fmt::format("no {} with a stamp came within {:.0f} s, but {} messages without: let the driver stamp them",
+                       what, patience_s, counts.unstamped);
   return fmt::format("no {} came within {:.0f} s{}{}", what, patience_s, unpublished.empty() ? "" : ": ", unpublished);
 }
 
@@ -239,10 +242,10 @@ std::string wait_for_end(const RecordOptions& options, const Clock& clock, Recor
     if (!first_s && counts.arrived > 0) first_s = now_s;
     progress.show(static_cast<int>(counts.images), fmt::format(" images, {} joint readings", counts.joints));
     if (!first_s && now_s > begin_s + patience_s)
-      return missing("image",
+      return missing("image", counts,
                      names_topic(options.camera) ? transports.unpublished(options.camera, "--camera") : std::string());
     if (!options.robot.empty() && counts.joints == 0 && now_s > begin_s + patience_s)
-      return missing("measured_js", transports.unpublished(options.robot, "--robot", "measured_js"));
+      return missing("measured_js", counts, transports.unpublished(options.robot, "--robot", "measured_js"));
     if (const auto ended = recording.ended()) return *ended;
     if (first_s && arm && now_s > last_image_s + max_silence_s) return "its images have stopped";
     if (first_s && arm) {

@@ -165,9 +165,11 @@ struct Tally {
   }
   // Blending has frames refused for other reasons, too.
   void print_refused() const {
-    for (const auto& [of, count] : refused)
+    for (const auto& [of, count] : refused) {
+      const bool by_blending = refused.contains({of.first, Status::blended}) && comes_by_compression(of.second);
       std::printf("  %s: %d %s: %s\n", of.first.c_str(), count, std::string(to_string(of.second)).c_str(),
-                  usual_cause(refused.contains({of.first, Status::blended}) ? Status::blended : of.second));
+                  usual_cause(by_blending ? Status::blended : of.second));
+    }
   }
   bool anything() const {
     return std::any_of(found.begin(), found.end(), [](const auto& entry) { return entry.second > 0; });

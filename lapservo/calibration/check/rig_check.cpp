@@ -51,7 +51,6 @@ std::optional<MarkerLight> typical_light(const std::vector<FrameEvidence>& frame
   light.clipped = median_over(frames, [](const FrameEvidence& f) { return f.light->clipped; });
   light.value = median_over(frames, [](const FrameEvidence& f) { return f.light->value; });
   light.chroma = median_over(frames, [](const FrameEvidence& f) { return f.light->chroma; });
-  light.coloured = median_over(frames, [](const FrameEvidence& f) { return f.light->coloured; });
   for (std::size_t band = 0; band < 3; ++band)
     light.hues_deg[band] = median_over(frames, [&](const FrameEvidence& f) { return f.light->hues_deg[band]; });
   return light;

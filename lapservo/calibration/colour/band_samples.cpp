@@ -47,18 +47,17 @@ MarkerLight light_of(const std::vector<BandSample>& samples, const Marker& marke
   MarkerLight light;
   std::vector<double> values, chromas;
   std::array<std::vector<double>, 3> beyond_deg;
-  std::size_t coloured = 0, clipped = 0;
+  std::size_t clipped = 0;
   for (const BandSample& sample : samples) {
     const auto [low, high] = std::minmax_element(sample.bgr.begin(), sample.bgr.end());
     values.push_back(*high), chromas.push_back(*high - *low);
     clipped += *high >= LightImage::saturated_value;
     const auto hue_deg = hue_deg_of(sample.bgr[0], sample.bgr[1], sample.bgr[2]);
     if (!hue_deg) continue;
-    ++coloured;
     beyond_deg[sample.band].push_back(std::remainder(*hue_deg - marker.hues_deg[sample.band], 360.0));
   }
   const auto count = static_cast<double>(samples.size());
-  light.clipped = static_cast<double>(clipped) / count, light.coloured = static_cast<double>(coloured) / count;
+  light.clipped = static_cast<double>(clipped) / count;
   light.value = median(values), light.chroma = median(chromas);
   for (std::size_t band = 0; band < 3; ++band)
     light.hues_deg[band] = marker.hues_deg[band] + (beyond_deg[band].empty() ? 0 : median(beyond_deg[band]));

@@ -29,7 +29,6 @@ struct MarkerLight {
   double clipped = 0;                ///< fraction of the pixels that have a saturated channel
   double value = 0;                  ///< median of the brightest channel, of 255
   double chroma = 0;                 ///< median of the brightest channel less the darkest one
-  double coloured = 0;               ///< fraction that has a hue at all
   std::array<double, 3> hues_deg{};  ///< of the bands: medians of what has a hue, near the marker's own
 };
 

@@ -10,6 +10,7 @@
 #include "lapservo/calibration/colour/band_samples.h"
 #include "lapservo/calibration/colour/marker_response.h"
 #include "lapservo/calibration/fit/robust_scale.h"
+#include "lapservo/core/angles.h"
 #include "lapservo/core/departures.h"
 #include "lapservo/core/statistics.h"
 #include "lapservo/vision/colour/colour_classes.h"

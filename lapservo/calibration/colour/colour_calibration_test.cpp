@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "lapservo/core/angles.h"
 #include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/renderer.h"
 #include "lapservo/sim/tissue.h"

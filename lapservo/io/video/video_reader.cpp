@@ -115,6 +115,10 @@ class VideoReader::State {
   }
 
   std::string complaint() const {
+    if (kind_ == Kind::stream)
+      return broke_off_ ? fmt::format("broke off, or was silent for {} s, after {:.2f} s",
+                                      std::chrono::duration<double>(patience_).count(), end_s_)
+                        : "";
     constexpr double slack = 0.01;  // durations are rounded
     const double frames_s = 2 / frames_per_second(), read_s = std::max(end_s_, end_of_all_s_);
     if (const auto announced_s = duration_s(); announced_s && read_s < (1 - slack) * *announced_s - frames_s)
@@ -178,7 +182,8 @@ class VideoReader::State {
   // Gives the decoder its next packet; false when it complains of it.
   bool feed() {
     if (kind_ == Kind::stream) deadline_ = Clock::now() + patience_;
-    while (av_read_frame(format_.get(), packet_.get()) >= 0) {
+    int read = 0;
+    while ((read = av_read_frame(format_.get(), packet_.get())) >= 0) {
       const bool ours = packet_->stream_index == stream_->index;
       look_at_end(*packet_);
       if (ours && packets_++ == 0) of_software_ = names_software();
@@ -188,6 +193,7 @@ class VideoReader::State {
       av_packet_unref(packet_.get());
       if (ours) return sent >= 0 || sent == AVERROR(EAGAIN);
     }
+    broke_off_ = kind_ == Kind::stream && read != AVERROR_EOF;
     return avcodec_send_packet(decoder_.get(), nullptr) >= 0;
   }
 
@@ -319,7 +325,7 @@ class VideoReader::State {
   bool fields_;
   GivenColours given_;
   std::string remark_;
-  bool is_srgb_ = false;
+  bool is_srgb_ = false, broke_off_ = false;
   bool of_software_ = false;  // a software encoder wrote the stream
   BgrConverter converter_;
   AVStream* stream_ = nullptr;

@@ -3,10 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "lapservo/core/angles.h"
+
 namespace lapservo::internal {
-double hue_gap_deg(double a_deg, double b_deg) {
-  return std::abs(std::remainder(a_deg - b_deg, 360.0));
-}
 
 std::optional<double> hue_deg_of(double b, double g, double r) {
   const double highest = std::max({b, g, r}), chroma = highest - std::min({b, g, r});

@@ -23,9 +23,6 @@ inline constexpr ColourLimits colour_limits;
 /// HSV hue of encoded values, degrees in (-60, 300], or nullopt for what is too grey or too dark to have one.
 std::optional<double> hue_deg_of(double b, double g, double r);
 
-/// Size of the angle between two hues.
-double hue_gap_deg(double a_deg, double b_deg);
-
 /// Which of the markers' colours a pixel has: 0 for none, else 1, 2, ... for the rig's distinct hues. A pixel has a
 /// colour when it is colourful and its HSV hue lies nearer to it than half the way to the next, so that exposure,
 /// shading and moderate white balance need no tuning. Looked up from the 5 high bits of each channel: 32 KiB.

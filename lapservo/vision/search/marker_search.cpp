@@ -118,7 +118,7 @@ Found MarkerSearch::detect_in_blob(const SearchFrame& frame, bool through_rcm, c
     if (!found.fit) {
       // A misprint is no reason to look for the marker elsewhere, with a boundary less.
       if (found.status == Status::marker_mismatch) return found;
-      if (!best.fit && found.status != Status::no_marker) best = found;
+      if (!best.fit && best.status == Status::no_marker) best = found;  // the likeliest start's refusal stays
       continue;
     }
     has_rivals |= best.fit && are_rivals(*best.fit, *found.fit);
@@ -136,7 +136,7 @@ Found MarkerSearch::detect(const SearchFrame& frame, bool through_rcm, Walk& wal
       walk.done = true;
       return found;
     }
-    if (found.status != Status::no_marker) best = std::move(found);
+    if (best.status == Status::no_marker) best = std::move(found);
     if (walk.blobs.stopped()) return best;
   }
   walk.done = true;
@@ -292,7 +292,7 @@ Found MarkerSearch::look_with_rcm(const SearchFrame& frame, WorkBudget& budget) 
   if (!searches_long_) return plain;
   budget.allow(longs_turn_ ? step : WorkBudget::Beyond::none);
   Found found = look_long(frame, is_mismatch, plain_is_known, budget);
-  if (found.fit || hidden_.done) begin_anew(status_);
+  if (found.fit || hidden_.done) begin_anew(found.fit ? Status::no_marker : status_);
   if (found.fit || plain.status == Status::no_marker) return found;
   return plain;
 }

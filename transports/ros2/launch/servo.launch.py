@@ -13,7 +13,9 @@ def start(context):
     def resolved(name):  # as ROS 2 does: a name that begins with / stands in no namespace
         return name if name.startswith('/') else f"{argument('namespace').rstrip('/')}/{name}"
 
-    moving = ['--enable-motion', '--joint-limits', argument('joint_limits')] if argument('enable_motion') == 'true' else []
+    moving = ['--enable-motion'] if argument('enable_motion') == 'true' else []
+    if argument('joint_limits'):
+        moving += ['--joint-limits', argument('joint_limits')]
     return [ExecuteProcess(
         cmd=['lapservo', 'servo', '--rig', argument('rig'), '--robot', 'ros2:' + resolved(argument('arm')),
              '--camera', 'ros2:' + resolved(argument('image')), *moving, *shlex.split(argument('options'))],

@@ -46,8 +46,11 @@ void check_files(const CalibrateCameraOptions& options, const std::optional<Rig>
   files.refuse_as_output(options.camera_info);
 }
 
-void look_at(const std::string& input, const FrameOptions& options, const Camera* camera, BoardRecordings& recordings) {
+void look_at(const std::string& input, const CalibrateCameraOptions& options, const Camera* camera,
+             BoardRecordings& recordings) {
   const auto source = open_frames(input, options, camera);
+  if (source->kind() == FrameSource::Kind::live && &input != &options.inputs.back())
+    throw InputError(input, "is a camera, whose Ctrl-C ends what comes after it, expected it as the last input");
   recordings.look_at(*source, input, watched_job(),
                      [](const std::string& wanted) { std::fprintf(stderr, "lapservo: %s\n", wanted.c_str()); });
   if (!recordings.read().stopped) say_complaint(input, recordings.read().complaint);
