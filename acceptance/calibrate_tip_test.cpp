@@ -169,7 +169,7 @@ cv::Mat show_touches(std::uint64_t seed, const Tool& truth, int count,
   const Eigen::Quaterniond lying = rotation_by({random.uniform(-0.5, 0.5), random.uniform(-0.3, 0.3), 0});
   const Rigid3 camera_from_board{lying, point_m - lying * middle_m};
   const cv::Mat board = render_board(scene, camera, camera_from_board, seed);
-  const std::array<float, 256> light_of = camera.response.table();
+  const LightTable light_of = camera.response.table();
   cv::Mat background(board.size(), CV_32FC3);
   for (int v = 0; v < board.rows; ++v)
     for (int u = 0; u < board.cols; ++u)

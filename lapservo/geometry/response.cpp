@@ -49,8 +49,8 @@ double Response::value_from_light(double light) const {
   return light <= 0.0031308 ? light * 12.92 : 1.055 * std::pow(light, 1 / 2.4) - 0.055;
 }
 
-std::array<float, 256> Response::table() const {
-  std::array<float, 256> light{};
+LightTable Response::table() const {
+  LightTable light{};
   for (std::size_t value = 0; value < light.size(); ++value)
     light[value] = static_cast<float>(light_from_value(static_cast<double>(value) / 255));
   return light;

@@ -6,6 +6,9 @@
 
 namespace lapservo {
 
+/// The light of each 8-bit value.
+using LightTable = std::array<float, 256>;
+
 /// How pixel values encode light. Values and light are in [0, 1].
 struct Response {
   enum class Kind { srgb, rec709, power, table };
@@ -21,7 +24,7 @@ struct Response {
   double light_from_value(double value) const;
   double value_from_light(double light) const;
   /// Light for each 8-bit value.
-  std::array<float, 256> table() const;
+  LightTable table() const;
 };
 
 }  // namespace lapservo

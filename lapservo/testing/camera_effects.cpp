@@ -139,7 +139,7 @@ cv::Mat compressed(const cv::Mat& picture, int quality) {
 
 // Linear light of an sRGB image.
 cv::Mat light_of(const cv::Mat& srgb) {
-  std::array<float, 256> table = Response{}.table();
+  LightTable table = Response{}.table();
   cv::Mat light;
   cv::LUT(srgb, cv::Mat(1, 256, CV_32F, table.data()), light);
   return light;

@@ -88,7 +88,7 @@ class Sight {
   ImageView view_;
   ColourClasses classes_;
   std::vector<std::optional<RcmPrior>> registrations_;
-  std::array<float, 256> table_;
+  LightTable table_;
   LightImage light_;
 };
 

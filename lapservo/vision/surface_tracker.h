@@ -59,7 +59,7 @@ class SurfaceTracker {
   std::optional<double> frame_budget_;
   double max_p_false_;
   ColourClasses classes_;
-  std::array<float, 256> light_;
+  LightTable light_;
   ChannelGeometry channels_;
   FrameClock clock_;
   double now_s_ = 0;  // of this frame

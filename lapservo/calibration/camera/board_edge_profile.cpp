@@ -32,7 +32,7 @@ struct Bin {
 
 std::optional<BoardEdgeProfile> profile_of(const EdgePixels& edge, int towards_bright, int channel, double blur_px,
                                            const Response& response) {
-  const std::array<float, 256> light = response.table();
+  const LightTable light = response.table();
   const auto c = static_cast<std::size_t>(channel);
   const int half = static_cast<int>(edge.reach_px / profile_step_px);
   const auto size = static_cast<std::size_t>(2 * half + 1);

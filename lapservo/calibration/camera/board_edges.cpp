@@ -71,7 +71,7 @@ struct Levels {
   double below = 0, above = 0;
 };
 
-std::optional<Levels> levels_of(const EdgePixels& edge, std::size_t channel, const std::array<float, 256>& light) {
+std::optional<Levels> levels_of(const EdgePixels& edge, std::size_t channel, const LightTable& light) {
   Levels sum;
   int below = 0, above = 0;
   for (const EdgePixel& pixel : edge.pixels) {
@@ -120,8 +120,7 @@ std::vector<EdgePixels> edges_of(const Board& board, const std::vector<BoardCorn
   return edges;
 }
 
-std::optional<BoardEdgeFit> fit_edge(const EdgePixels& edge, int channel,
-                                     const std::array<float, 256>& light_of_value) {
+std::optional<BoardEdgeFit> fit_edge(const EdgePixels& edge, int channel, const LightTable& light_of_value) {
   const auto c = static_cast<std::size_t>(channel);
   const auto levels = levels_of(edge, c, light_of_value);
   if (!levels) return std::nullopt;

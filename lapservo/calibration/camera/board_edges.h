@@ -55,6 +55,6 @@ struct BoardEdgeFit {
 };
 
 /// nullopt where there is no such edge: too little contrast, saturated, or a fit that leaves it.
-std::optional<BoardEdgeFit> fit_edge(const EdgePixels& edge, int channel, const std::array<float, 256>& light_of_value);
+std::optional<BoardEdgeFit> fit_edge(const EdgePixels& edge, int channel, const LightTable& light_of_value);
 
 }  // namespace lapservo::internal

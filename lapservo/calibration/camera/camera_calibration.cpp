@@ -106,7 +106,7 @@ constexpr int green = 1;
 
 MeasuredEdges measured(const Board& board, const std::vector<BoardView>& views, const LensFit& fit, bool all_channels,
                        bool with_profiles) {
-  const std::array<float, 256> light = fit.camera.response.table();
+  const LightTable light = fit.camera.response.table();
   MeasuredEdges result;
   for (std::size_t i = 0; i < views.size(); ++i) {
     auto& points = result.points.emplace_back();

@@ -42,7 +42,7 @@ class MarkerResponse {
   struct Candidate {
     std::string name;
     Response response;
-    std::array<float, 256> light;
+    LightTable light;
     std::vector<double> apart_px;  ///< of each edge
   };
 

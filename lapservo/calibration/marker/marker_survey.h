@@ -43,7 +43,7 @@ class MarkerSurvey {
   Rig rig_;
   std::size_t instrument_;
   ColourClasses classes_;
-  std::array<float, 256> light_;
+  LightTable light_;
   std::optional<Sighting> last_;
 };
 
@@ -98,7 +98,7 @@ class ViewMeasurer {
  private:
   ColourClasses classes_;
   std::array<std::uint8_t, 3> bands_;
-  std::array<float, 256> light_;
+  LightTable light_;
 };
 
 }  // namespace lapservo::internal

@@ -352,7 +352,7 @@ std::vector<std::array<double, 3>> sampled(const std::vector<std::array<double, 
 // The effect of the processing on light across edges that lie where they were found; `seen_px`: what blurs them in the
 // image whose colours are fitted.
 Section processed(const Section& section, const SeamFit& found, double seen_px, double radius_m,
-                  const PictureProcessing& processing, const std::array<float, 256>& light_of_value, bool grey) {
+                  const PictureProcessing& processing, const LightTable& light_of_value, bool grey) {
   const SeamBasis seen = basis_of(section, found.upper_m, found.gap_m, seen_px, radius_m);
   const SeamBasis true_basis = basis_of(section, found.upper_m, found.gap_m, processing.blur_px, radius_m);
   Section out = section;
@@ -378,7 +378,7 @@ Section processed(const Section& section, const SeamFit& found, double seen_px, 
 // By all channels; what the processing moves the edges by is taken off.
 std::optional<SeamFit> fit_by_colours(const Section& section, const SeamSearch& search, double blur_px,
                                       const std::optional<PictureProcessing>& processing,
-                                      const std::array<float, 256>& light_of_value) {
+                                      const LightTable& light_of_value) {
   auto found = fit(section, search, blur_px);
   if (!found || !processing) return found;
   const Section seen = processed(section, *found, blur_px, search.radius_m, *processing, light_of_value, false);
@@ -391,7 +391,7 @@ std::optional<SeamFit> fit_by_colours(const Section& section, const SeamSearch& 
 // By the grey image: colour differences are blurred far wider, over the gap and into each other.
 std::optional<SeamFit> fit_by_luma(const Section& colours, const Section& grey, const SeamSearch& search,
                                    double colours_px, const PictureProcessing& processing,
-                                   const std::array<float, 256>& light_of_value) {
+                                   const LightTable& light_of_value) {
   const double grey_px = std::sqrt(processing.blur_px * processing.blur_px + seam_sampling_px2);
   auto found = fit(grey, search, grey_px);
   if (!found) return std::nullopt;

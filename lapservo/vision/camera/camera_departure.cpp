@@ -15,8 +15,8 @@ namespace {
 constexpr const DepartureLimits& believed = departure_limits;
 constexpr Look in_light{24, 1, Between::light};
 
-std::array<float, 256> raised(const std::array<float, 256>& light_of_value, double exponent) {
-  std::array<float, 256> out;
+LightTable raised(const LightTable& light_of_value, double exponent) {
+  LightTable out;
   for (std::size_t i = 0; i < out.size(); ++i) out[i] = std::pow(light_of_value[i], static_cast<float>(exponent));
   return out;
 }
@@ -209,7 +209,7 @@ SeenBoundaries seen_in(const ChannelGeometry& channels, const PooledEdges& edges
 }
 
 // The same for values between two pixels: along straight lines, too.
-float light_between(const std::array<float, 256>& light_of_value, float value) {
+float light_between(const LightTable& light_of_value, float value) {
   const float place = std::clamp(255 * value, 0.0F, 254.99F);
   const auto i = static_cast<std::size_t>(place);
   return light_of_value[i] + (place - static_cast<float>(i)) * (light_of_value[i + 1] - light_of_value[i]);

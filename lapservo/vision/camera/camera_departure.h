@@ -73,7 +73,7 @@ class DepartedLight {
   const LightImage& light() const { return light_; }
 
  private:
-  std::array<float, 256> light_of_value_;  // where it is not the rig's
+  LightTable light_of_value_;  // where it is not the rig's
   LightImage light_;
 };
 

@@ -105,7 +105,7 @@ using ProcessingMatrix = Eigen::Matrix<double, processing_unknowns, processing_u
 // Gauss-Newton with edges eliminated.
 class Problem {
  public:
-  Problem(const std::array<float, 256>& light_of_value, std::span<const PooledEdge> edges, double blur_px,
+  Problem(const LightTable& light_of_value, std::span<const PooledEdge> edges, double blur_px,
           const ProcessingVector& sigmas, const ExpectedPicture& picture, double chroma_shift_px = 0)
       : model_(light_of_value),
         edges_(edges),
@@ -302,7 +302,7 @@ bool is_believed(const ProcessedEdges& edges) {
          edges.misfit < processing_limits.max_misfit_fraction * edges.misfit_without;
 }
 
-std::optional<PictureProcessing> first_guess(const std::array<float, 256>& light_of_value, const PooledEdges& edges,
+std::optional<PictureProcessing> first_guess(const LightTable& light_of_value, const PooledEdges& edges,
                                              double blur_px) {
   const std::span<const PooledEdge> all(edges.all.begin(), edges.all.size());
   if (!is_enough(all)) return std::nullopt;
@@ -310,8 +310,8 @@ std::optional<PictureProcessing> first_guess(const std::array<float, 256>& light
   return processing_of(problem.first_processing());
 }
 
-std::optional<ProcessedEdges> explain(const std::array<float, 256>& light_of_value, const PooledEdges& edges,
-                                      double blur_px, const ExpectedPicture& expected) {
+std::optional<ProcessedEdges> explain(const LightTable& light_of_value, const PooledEdges& edges, double blur_px,
+                                      const ExpectedPicture& expected) {
   const std::span<const PooledEdge> all(edges.all.begin(), edges.all.size());
   if (!is_enough(all)) return std::nullopt;
   const ProcessingVector sigmas = expected_sigmas(expected.only_video);

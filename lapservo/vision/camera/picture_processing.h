@@ -48,13 +48,13 @@ struct ProcessedEdges {
 bool is_processed(const PictureProcessing& processing);
 
 /// A first guess at the processing, for a fifth of the time. Nullopt when too little was seen.
-std::optional<PictureProcessing> first_guess(const std::array<float, 256>& light_of_value, const PooledEdges& edges,
+std::optional<PictureProcessing> first_guess(const LightTable& light_of_value, const PooledEdges& edges,
                                              double blur_px);
 
 /// The likeliest processing, from what all boundaries look like; such as is expected. `blur_px` is what fit_step was
 /// given. Nullopt when too little was seen.
-std::optional<ProcessedEdges> explain(const std::array<float, 256>& light_of_value, const PooledEdges& edges,
-                                      double blur_px, const ExpectedPicture& expected = {});
+std::optional<ProcessedEdges> explain(const LightTable& light_of_value, const PooledEdges& edges, double blur_px,
+                                      const ExpectedPicture& expected = {});
 
 /// Whether the frame looks like that rather than like none.
 bool is_believed(const ProcessedEdges& edges);

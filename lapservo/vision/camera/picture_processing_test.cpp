@@ -19,7 +19,7 @@ namespace {
 using scenes::Shot;
 using scenes::usual_shot;
 
-const std::array<float, 256>& srgb() {
+const LightTable& srgb() {
   static const auto table = Response{}.table();
   return table;
 }

@@ -112,7 +112,7 @@ Eigen::Vector3d saturated_by(double saturation, const Eigen::Vector3d& bgr) {
 // The response both ways, with slopes.
 class Encoding {
  public:
-  explicit Encoding(const std::array<float, 256>& light_of_value) : light_(light_of_value) {}
+  explicit Encoding(const LightTable& light_of_value) : light_(light_of_value) {}
 
   struct At {
     float y, slope;
@@ -133,7 +133,7 @@ class Encoding {
   }
 
  private:
-  const std::array<float, 256>& light_;
+  const LightTable& light_;
 };
 
 // The encoded light on the grid, a column for each of b, g, r, and its changes.
@@ -318,7 +318,7 @@ ProcessedEdge::Linearised ProcessedEdge::linearised(const ProcessingFilters& fil
   return out;
 }
 
-FilteredLight filtered_light(const std::array<float, 256>& light_of_value, const PictureProcessing& processing,
+FilteredLight filtered_light(const LightTable& light_of_value, const PictureProcessing& processing,
                              std::span<const std::array<double, 3>> light) {
   PictureProcessing unsaturated = processing;
   unsaturated.saturation = 1;

@@ -67,7 +67,7 @@ struct ProcessingFilters {
 /// A camera's image of a step of light.
 class ProcessedEdge {
  public:
-  explicit ProcessedEdge(const std::array<float, 256>& light_of_value) : light_of_value_(light_of_value) {}
+  explicit ProcessedEdge(const LightTable& light_of_value) : light_of_value_(light_of_value) {}
 
   EdgeSamples values(const ProcessingFilters& filters, const PictureProcessing& processing,
                      const EdgeVector& edge) const;
@@ -80,7 +80,7 @@ class ProcessedEdge {
                         const EdgeVector& edge) const;
 
  private:
-  const std::array<float, 256>& light_of_value_;
+  const LightTable& light_of_value_;
 };
 
 /// Light along a line, a pixel apart, as it looks after blurred colour differences in their place and sharpening. Light
@@ -90,7 +90,7 @@ struct FilteredLight {
   std::vector<std::array<double, 3>> light;
   std::vector<double> luma;
 };
-FilteredLight filtered_light(const std::array<float, 256>& light_of_value, const PictureProcessing& processing,
+FilteredLight filtered_light(const LightTable& light_of_value, const PictureProcessing& processing,
                              std::span<const std::array<double, 3>> light);
 
 }  // namespace lapservo::internal

@@ -1,5 +1,3 @@
-#include "lapservo/vision/edges/blurred_boundary.h"
-
 #include <array>
 #include <cmath>
 #include <vector>
@@ -11,6 +9,7 @@
 #include "lapservo/core/statistics.h"
 #include "lapservo/testing/motion.h"
 #include "lapservo/testing/shots.h"
+#include "lapservo/vision/edges/edge_blur.h"
 
 namespace lapservo::internal {
 namespace {

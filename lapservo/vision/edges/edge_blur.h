@@ -29,6 +29,21 @@ struct BlurEllipse {
   double along_normal_px(const Eigen::Vector2d& normal) const;
 };
 
+/// A boundary's course in the image about a point of it, in coordinates along the shaft and across it, and how the
+/// light changes across the shaft there.
+struct BoundaryCourse {
+  double slope = 0;                ///< d(along)/d(across)
+  double curvature_per_px = 0;     ///< d2(along)/d(across)2
+  double light_change_per_px = 0;  ///< d(log light)/d(across)
+};
+
+/// How far along the shaft a wide blur moves a boundary: it mixes what lies beside on either side, and more of where
+/// there is more light. To second order of the blur.
+inline double moved_by_blur_px(const BoundaryCourse& course, const BlurEllipse& blur) {
+  return (course.slope * blur.across_px2 - blur.oblique_px2) * course.light_change_per_px +
+         0.5 * course.curvature_per_px * blur.across_px2;
+}
+
 /// Width of the blur (one sigma) of each boundary along the shaft and of the sides across it: that of a lens and of a
 /// motion within the exposure. Turns about whatever axis move each boundary by another length. Carried from frame to
 /// frame.

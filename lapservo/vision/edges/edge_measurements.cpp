@@ -9,7 +9,6 @@
 #include "lapservo/core/statistics.h"
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/marker/azimuths.h"
-#include "lapservo/vision/edges/blurred_boundary.h"
 #include "lapservo/vision/edges/edge_lines.h"
 #include "lapservo/vision/edges/film_edge.h"
 
@@ -197,7 +196,7 @@ bool place_boundary(const Frame& frame, const Neighbourhood& generatrices, std::
       moved_by_blur_px(course_of(frame, generatrices, along_m[k], slope_m, depth_m, image.point_px, place.along), blur);
   if (!std::isfinite(place.moved_by_blur_px)) return false;  // seen along the axis
 
-  double gap_px = 1e9;
+  double gap_px = HUGE_VAL;
   if (k > 0) gap_px = std::min(gap_px, (along_m[k] - along_m[k - 1]) * px_per_m);
   if (k < 3) gap_px = std::min(gap_px, (along_m[k + 1] - along_m[k]) * px_per_m);
   const double blur_px = blur.along_normal_px(place.normal), line_blur_px = blur_px / cosine;

@@ -10,6 +10,8 @@
 
 #include <Eigen/Core>
 
+#include "lapservo/vision/image/lens_field.h"
+
 namespace lapservo::internal {
 namespace {
 
@@ -90,14 +92,13 @@ class BoxOfPoints {
 constexpr double margin_px = 4;
 
 std::optional<PixelBox> box_of_pose(const Camera& camera, const Marker& marker, const Rigid3& camera_from_unrolled) {
-  constexpr double nearest_m = 1e-3;
   BoxOfPoints corners;
   for (const double along_m : {0.0, marker.length_m()})
     for (const double x : {-1.0, 1.0})
       for (const double y : {-1.0, 1.0}) {
         const Eigen::Vector3d corner =
             camera_from_unrolled * Eigen::Vector3d(x * marker.radius_m(), y * marker.radius_m(), along_m);
-        if (!(corner.z() > nearest_m)) return std::nullopt;
+        if (!(corner.z() > LensField::nearest_m)) return std::nullopt;
         corners.add(camera.raw_from_point(corner));
       }
   return corners.box(camera, margin_px);

@@ -48,7 +48,7 @@ class EvenField {
  private:
   std::uint8_t mean(std::uint8_t a, std::uint8_t b) const;
 
-  std::array<float, 256> light_of_value_;
+  LightTable light_of_value_;
   std::array<std::uint8_t, 16384> value_of_light_{};
   cv::Mat field_bgr_;
 };

@@ -15,6 +15,8 @@ namespace lapservo::internal {
 /// image.
 class LensField {
  public:
+  static constexpr double nearest_m = 1e-3;  ///< to the camera, along its axis
+
   explicit LensField(const Camera& camera) {
     const double beyond_corner = is_invertible_everywhere(camera) ? 1.1 : 1;
     const double widest = beyond_corner * std::tan(half_field_rad(camera));
@@ -22,8 +24,7 @@ class LensField {
   }
   /// For a point in the camera's frame, or a ray to it.
   bool contains(const Eigen::Vector3d& point) const {
-    constexpr double nearest = 1e-3;
-    return point.z() > nearest && point.head<2>().squaredNorm() < widest_squared_ * point.z() * point.z();
+    return point.z() > nearest_m && point.head<2>().squaredNorm() < widest_squared_ * point.z() * point.z();
   }
 
  private:

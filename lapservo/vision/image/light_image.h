@@ -38,7 +38,7 @@ struct ChannelGeometry {
 /// Places are green's; those of blue and red are found by the camera's chromatic aberration.
 class LightImage {
  public:
-  LightImage(const ImageView& image, const std::array<float, 256>& light_of_value, const ChannelGeometry& channels = {})
+  LightImage(const ImageView& image, const LightTable& light_of_value, const ChannelGeometry& channels = {})
       : image_(&image), light_(&light_of_value), channels_(channels) {}
 
   /// The same frame where channels are magnified by so much more.
@@ -50,7 +50,7 @@ class LightImage {
 
   const ImageView& image() const { return *image_; }
   const ChannelGeometry& channels() const { return channels_; }
-  const std::array<float, 256>& light_of_value() const { return *light_; }
+  const LightTable& light_of_value() const { return *light_; }
 
   /// Encoded values at and above this are taken for saturated: the light there is unknown.
   static constexpr std::uint8_t saturated_value = 252;
@@ -92,7 +92,7 @@ class LightImage {
     const float fu = u - static_cast<float>(iu), fv = v - static_cast<float>(iv);
     const std::uint8_t* top = image_->pixel(iu, iv);
     const std::uint8_t* bottom = top + image_->row_bytes;
-    const std::array<float, 256>& light = *light_;
+    const LightTable& light = *light_;
     const float w00 = (1 - fu) * (1 - fv), w01 = fu * (1 - fv), w10 = (1 - fu) * fv, w11 = fu * fv;
     for (std::size_t c = First; c < Last; ++c) {
       sample.light[c] =
@@ -103,7 +103,7 @@ class LightImage {
   }
 
   const ImageView* image_;
-  const std::array<float, 256>* light_;
+  const LightTable* light_;
   ChannelGeometry channels_;
 };
 

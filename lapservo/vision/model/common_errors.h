@@ -22,7 +22,7 @@ struct UsualErrors {
   /// move together by more, mostly where the light comes from aside.
   double common_fraction_of_blur = 0.008, whole_fraction_of_blur = 0.02;
   /// And of the blur's square beyond a lens's, by the shaft's radius: how far sides, which are no steps, are off, and
-  /// by how much all boundaries lean alike, which is what the model of it (blurred_boundary.h) leaves. Sides of sharp
+  /// by how much all boundaries lean alike, which is what the model of it (moved_by_blur_px()) leaves. Sides of sharp
   /// images have a blur of usual_side_blur_px.
   double usual_side_blur_px = 1.05, side_of_blur = 1.4, leaning_of_blur = 0.035;
   /// And as a fraction of what the camera's processing moves a boundary by, which is known so well; where colours are

@@ -112,22 +112,23 @@ std::optional<MiddleLine> middle_line(const Camera& camera, const BandMasks& mas
   const Eigen::Vector2d origin(region.box.x + m.m10 / m.m00, region.box.y + m.m01 / m.m00),
       across(-along.y(), along.x());
   struct Extent {
-    double low = 1e9, high = -1e9;
+    double low = HUGE_VAL, high = -HUGE_VAL;
   };
-  std::vector<Extent> sections(4096);
-  double first = 1e9, last = -1e9;
+  constexpr int middle = 2048;  // of as many sections on either side
+  std::vector<Extent> sections(2 * middle);
+  double first = HUGE_VAL, last = -HUGE_VAL;
   for (const cv::Point& pixel : pixels) {
     const Eigen::Vector2d offset = Eigen::Vector2d(pixel.x + region.box.x, pixel.y + region.box.y) - origin;
     const double x = offset.dot(along);
     first = std::min(first, x), last = std::max(last, x);
-    const double index = std::clamp(x + 2048, 0.0, 4095.0);
+    const double index = std::clamp(x + middle, 0.0, 2.0 * middle - 1);
     Extent& section = sections[static_cast<std::size_t>(index)];
     section.low = std::min(section.low, offset.dot(across)), section.high = std::max(section.high, offset.dot(across));
   }
   const double widest = 0.15 * (last - first);  // the ends are round
   std::vector<cv::Point2f> low, high;
   for (std::size_t i = 0; i < sections.size(); ++i) {
-    const double x = static_cast<double>(i) - 2048 + 0.5;
+    const double x = static_cast<double>(i) - middle + 0.5;
     if (sections[i].low > sections[i].high || x < first + widest || x > last - widest) continue;
     const auto ideal = [&](double y) { return camera.ideal_from_raw(origin + x * along + y * across); };
     const auto a = ideal(sections[i].low), b = ideal(sections[i].high);
@@ -137,8 +138,9 @@ std::optional<MiddleLine> middle_line(const Camera& camera, const BandMasks& mas
   }
   if (low.size() < 8) return std::nullopt;
   cv::Vec4f low_line, high_line;
-  cv::fitLine(low, low_line, cv::DIST_HUBER, 0, 0.01, 0.01);
-  cv::fitLine(high, high_line, cv::DIST_HUBER, 0, 0.01, 0.01);
+  constexpr double accurate_to = 0.01;  // px, and rad
+  cv::fitLine(low, low_line, cv::DIST_HUBER, 0, accurate_to, accurate_to);
+  cv::fitLine(high, high_line, cv::DIST_HUBER, 0, accurate_to, accurate_to);
   const auto direction = [&](const cv::Vec4f& line) {
     const Eigen::Vector2d d(line[0], line[1]);
     return d.dot(along) < 0 ? Eigen::Vector2d(-d) : d;
@@ -153,7 +155,7 @@ std::optional<Edges> boundaries_on(const MiddleLine& line, const Camera& camera,
   constexpr double step_px = 0.5;
   const int reach = 4 * std::max(camera.width_px, camera.height_px);
   std::array<double, 3> first, last;
-  first.fill(1e9), last.fill(-1e9);
+  first.fill(HUGE_VAL), last.fill(-HUGE_VAL);
   for (int i = -reach; i <= reach; ++i) {
     const double x = i * step_px;
     const Eigen::Vector2d ideal = line.origin_px + x * line.along;
@@ -187,7 +189,7 @@ std::optional<JointVector> configuration_from(const Camera& camera, const Marker
     return Eigen::Vector4d(line->ideal_px[0].x(), line->ideal_px[0].y(), line->ideal_px[3].x(), line->ideal_px[3].y());
   };
   const Eigen::Vector4d measured(edges[0].x(), edges[0].y(), edges[3].x(), edges[3].y());
-  double miss_px = 1e9;
+  double miss_px = HUGE_VAL;
   for (int iteration = 0; iteration < 15; ++iteration) {
     const auto at = seen(x);
     if (!at) return std::nullopt;
@@ -202,7 +204,8 @@ std::optional<JointVector> configuration_from(const Camera& camera, const Marker
     normal.diagonal() *= 1 + 1e-6;
     const Eigen::Vector3d step = normal.ldlt().solve(jacobian.transpose() * (measured - *at));
     if (!step.allFinite()) return std::nullopt;
-    x += step.cwiseMax(Eigen::Vector3d(-0.2, -0.2, -0.02)).cwiseMin(Eigen::Vector3d(0.2, 0.2, 0.02));
+    const Eigen::Vector3d longest(0.2, 0.2, 0.02);
+    x += step.cwiseMax(-longest).cwiseMin(longest);
   }
   if (miss_px > 10) return std::nullopt;  // no shaft through the RCM looks like this
   const Rigid3 unrolled = camera_from_rcm * rcm_from_unrolled({x[0], x[1], x[2], 0});

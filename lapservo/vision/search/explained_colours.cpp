@@ -64,7 +64,7 @@ double area_px2(const Scene& scene, const ShaftPose& pose) {
   };
   const double length_m = scene.marker.length_m();
   const Eigen::Vector3d first = on_axis(0), last = on_axis(length_m);
-  if (!(first.z() > 1e-3) || !(last.z() > 1e-3)) return 0;
+  if (!(first.z() > LensField::nearest_m) || !(last.z() > LensField::nearest_m)) return 0;
   const double width_px = scene.marker.diameter_m * scene.camera.fx_px / on_axis(length_m / 2).norm();
   return width_px * (scene.camera.ideal_from_point(last) - scene.camera.ideal_from_point(first)).norm();
 }

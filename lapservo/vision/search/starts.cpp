@@ -20,6 +20,7 @@
 namespace lapservo::internal {
 namespace {
 
+constexpr double least_sine = 0.05;  // of the angle from the pole: lines fan out
 constexpr std::size_t line_count = 32, few_lines = 12, line_samples = 112, most_starts = 3;
 constexpr double nearer_scale = 0.8;  // blood along a side makes a shaft look thin, so far away
 
@@ -72,10 +73,9 @@ bool may_be_in_order(BandCosines& bands) {
 // Over a blob's samples of the marker's colours, and as far beyond them as they are apart. Nullopt where they lie in
 // another order, or on all sides of the pole: the shaft points at the camera.
 std::optional<Fan> fan_over(const Scene& scene, const Blob& blob, const RaysFromPole& rays, std::size_t lines) {
-  constexpr double least_sine = 0.05;
   std::optional<double> alpha_rad;  // of the first sample
   Eigen::Vector3d ahead = Eigen::Vector3d::Zero(), aside = ahead;
-  double least_tangent = 1e9, most_tangent = -1e9, least_cosine = 1, most_cosine = -1;
+  double least_tangent = HUGE_VAL, most_tangent = -HUGE_VAL, least_cosine = 1, most_cosine = -1;
   BandCosines bands;
   for (const Blob::Sample& sample : blob.samples) {
     const auto band = std::find(scene.bands.begin(), scene.bands.end(), sample.colour);
@@ -161,7 +161,7 @@ Window window_about(const Scene& scene, const Fan& fan, const Lines& lines, std:
   const double length_rad = line.length() * fan.step_beta_rad;
   const double beta_rad = fan.beta_rad((line.split.position[0] + line.split.position[3]) / 2);
   const double half_rad = 0.8 * scene.marker.radius_m() / scene.marker.length_m() * length_rad;
-  const auto half = static_cast<std::size_t>(half_rad / std::max(0.05, std::sin(beta_rad)) / fan.step_alpha_rad);
+  const auto half = static_cast<std::size_t>(half_rad / std::max(least_sine, std::sin(beta_rad)) / fan.step_alpha_rad);
   window.first = middle - std::min(middle, half), window.last = std::min(middle + half, lines.size() - 1);
   for (std::size_t i = window.first; i <= window.last; ++i) window.score += lines[i].score;
   return window;
@@ -272,7 +272,7 @@ double distance_by_width_m(const Scene& scene, const Extent& extent) {
 double alpha_of_axis(const Scene& scene, const Extent& extent, double distance_m) {
   if (!extent.only_side_rad) return extent.alpha_rad;
   return *extent.only_side_rad +
-         extent.away_from_side * scene.marker.radius_m() / (distance_m * std::max(0.05, extent.sine_of_beta));
+         extent.away_from_side * scene.marker.radius_m() / (distance_m * std::max(least_sine, extent.sine_of_beta));
 }
 
 // How far away the proximal end of a shaft through the RCM is, by the length that the marker shows; by its width where
@@ -283,7 +283,7 @@ double distance_of(const Scene& scene, const Extent& extent, double first_beta_r
   const double by_width_m = distance_by_width_m(scene, extent);
   if (!extent.first_beta_rad || !extent.last_beta_rad) return by_width_m;
   const Eigen::Vector3d rcm = rcm_m * extent.rays.pole();
-  double least = 1e300, best_m = by_width_m;
+  double least = HUGE_VAL, best_m = by_width_m;
   for (int i = 0; i <= steps; ++i) {
     const double distance_m = nearest_m * std::pow(farthest_m / nearest_m, 1.0 * i / steps);
     const Eigen::Vector3d proximal = distance_m * extent.rays.ray(extent.alpha_rad, first_beta_rad);

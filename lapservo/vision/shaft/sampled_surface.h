@@ -37,7 +37,8 @@ class LineInImage {
   /// shaft, where another one's marker shows.
   const std::uint8_t* pixel(std::size_t k, bool on_shaft) const {
     const double u = u_px_[k] + 0.5, v = v_px_[k] + 0.5;
-    if (!(depth_m_[k] > 1e-3 && u >= 0 && v >= 0 && u < scene_.image.width_px && v < scene_.image.height_px))
+    if (!(depth_m_[k] > LensField::nearest_m && u >= 0 && v >= 0 && u < scene_.image.width_px &&
+          v < scene_.image.height_px))
       return nullptr;
     if (!scene_.others.empty()) {
       const Eigen::Vector2d raw_px(u_px_[k], v_px_[k]);

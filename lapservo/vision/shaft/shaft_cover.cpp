@@ -117,7 +117,7 @@ void ShaftCover::draw(const Camera& camera, const Marker& marker, const std::arr
 }
 
 void ShaftCover::frame(const Camera& camera) {
-  Eigen::Vector2d first(1e9, 1e9), last(-1e9, -1e9);
+  Eigen::Vector2d first(HUGE_VAL, HUGE_VAL), last(-HUGE_VAL, -HUGE_VAL);
   for (const Section& section : sections_)
     for (const Eigen::Vector2d& place : {section.left_px, section.right_px})
       first = first.cwiseMin(place), last = last.cwiseMax(place);
@@ -133,7 +133,8 @@ void ShaftCover::fill(const Section& section, const Marker& marker, const EndsOf
                       const std::array<std::uint8_t, 3>& bands) {
   const Eigen::Vector2d across_px = section.right_px - section.left_px;
   const double width_px = across_px.norm(), doubt_m = doubt_px / std::max(1.0, section.px_per_m);
-  const bool marked = section.along_m > -marker.length_m() / 2 && section.along_m < 1.5 * marker.length_m();
+  const bool marked =
+      section.along_m > -marker.length_m() / 2 && section.along_m < (1 + reach_lengths) * marker.length_m();
   const int steps = static_cast<int>(width_px / (cell_px / 2)) + 1;
   for (int i = 0; i <= steps; ++i) {
     const double fraction = static_cast<double>(i) / steps;
