@@ -9,6 +9,7 @@
 
 #include "lapservo/core/error.h"
 #include "lapservo/crtk/image_decoder.h"
+#include "lapservo/io/pictures/jpeg_picture.h"
 #include "recordings/bag_topics.h"
 
 namespace lapservo::internal {
@@ -36,7 +37,7 @@ const std::string& BagFrames::why() const {
 std::optional<BagFrames::Picture> BagFrames::read() {
   while (auto message = messages_.next()) {
     if (const auto* compressed = std::get_if<CompressedImageMessage>(&message->message); compressed && !first_)
-      is_jpeg_ = compressed->data.size() > 1 && compressed->data[0] == 0xff && compressed->data[1] == 0xd8;
+      is_jpeg_ = is_jpeg(compressed->data);
     DecodedImage image = decoded(std::move(message->message));
     if (auto* bgr = std::get_if<cv::Mat>(&image)) return Picture{message->time_s, std::move(*bgr)};
     if (unreadable_++ == 0) why_unreadable_ = std::get<BadImage>(image).why;

@@ -1,7 +1,6 @@
 #include "lapservo/control/controller_config.h"
 
 #include <cmath>
-#include <cstddef>
 #include <string>
 
 #include "lapservo/control/delay_estimator.h"
@@ -39,15 +38,18 @@ void check_gains(const ControllerConfig& config) {
   }
 }
 
+void require_plausible(const char* field, const Eigen::Vector4d& values, const JointUnits& units) {
+  require_positive(field, values);
+  if (const auto found = find_implausible({values[0], values[1], values[2], values[3]}, units)) {
+    const int i = static_cast<int>(found->number);
+    throw InputError("controller", element(field, i), std::to_string(values[i]), found->expected);
+  }
+}
+
 void check_limits(const JointLimits& limits, double period_s) {
-  require_positive("limits.rate", limits.rate);
-  require_positive("limits.acceleration", limits.acceleration);
-  constexpr auto plausible = "a number of rad or m: it looks like degrees or millimetres";
+  require_plausible("limits.rate", limits.rate, joint_rates);
+  require_plausible("limits.acceleration", limits.acceleration, joint_accelerations);
   for (int i = 0; i < 4; ++i) {
-    const auto k = static_cast<std::size_t>(i);
-    require(limits.rate[i] <= joint_rates.most[k], element("limits.rate", i), limits.rate[i], plausible);
-    require(limits.acceleration[i] <= joint_accelerations.most[k], element("limits.acceleration", i),
-            limits.acceleration[i], plausible);
     require(std::isfinite(limits.lower[i]), element("limits.lower", i), limits.lower[i], "a finite number");
     require(std::isfinite(limits.upper[i]) && limits.upper[i] > limits.lower[i], element("limits.upper", i),
             limits.upper[i], "a number above the lower limit");

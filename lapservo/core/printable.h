@@ -13,4 +13,12 @@ inline std::string printable(const std::string& text) {
   return shown;
 }
 
+/// Names, with commas between them.
+template <typename Names>
+std::string printable_names(const Names& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + printable(name);
+  return text;
+}
+
 }  // namespace lapservo::internal

@@ -114,11 +114,9 @@ CrtkRobot::~CrtkRobot() {
 void CrtkRobot::look_at_readers() {
   const std::string topic = topic_of(arm_, "servo_jp");
   auto readers = transport_.readers(topic);
-  if (readers.size() > max_readers_ && readers != readers_) {
-    std::string names;
-    for (const std::string& name : readers) names += (names.empty() ? "" : ", ") + printable(name);
-    std::fprintf(stderr, "lapservo: %s is read by %s, expected %zu\n", topic.c_str(), names.c_str(), max_readers_);
-  }
+  if (readers.size() > max_readers_ && readers != readers_)
+    std::fprintf(stderr, "lapservo: %s is read by %s, expected %zu\n", topic.c_str(), printable_names(readers).c_str(),
+                 max_readers_);
   readers_ = std::move(readers);
   const std::lock_guard lock(mutex_);
   interlock_.on_readers(readers_.size());

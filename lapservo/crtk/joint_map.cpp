@@ -86,22 +86,13 @@ std::string repeated_joint(const Joints& joints, const std::vector<std::string>&
   return repeated.empty() && other ? repeated_of(*other, names) : repeated;
 }
 
-namespace {
-
-std::string printed(std::vector<std::string> names) {
-  for (std::string& name : names) name = printable(name);
-  return fmt::format("{}", fmt::join(names, ", "));
-}
-
-}  // namespace
-
 std::string unfit_joints(const Joints& joints, const std::vector<std::string>& names) {
   if (const std::string twice = repeated_joint(joints, names); !twice.empty())
-    return fmt::format("has the joints {}: {} stands there twice, expected each name once", printed(names),
+    return fmt::format("has the joints {}: {} stands there twice, expected each name once", printable_names(names),
                        printable(twice));
   if (names.empty()) return "names no joints: enable and home the arm";
   const auto other = other_names(joints);
-  return fmt::format("has the joints {}, expected {}{}{}", printed(names), fmt::join(joints.names, ", "),
+  return fmt::format("has the joints {}, expected {}{}{}", printable_names(names), fmt::join(joints.names, ", "),
                      other ? fmt::format(" or {}", fmt::join(*other, ", ")) : "",
                      has_no_tool(names) ? ". The arm knows no instrument: name it on set_tool_type" : "");
 }

@@ -88,11 +88,15 @@ class PictureSource : public FrameSource {
   std::size_t next_ = 0, low_bits_ = 0;
 };
 
+// A file, or a stream, which is live.
 class VideoSource : public FrameSource {
  public:
-  VideoSource(const std::string& path, const VideoReading& reading)
-      : video_(path, std::chrono::seconds(5), VideoReader::Kind::file, reading), first_(video_.next()) {
-    if (!first_) throw InputError(path, "has no frames, expected a video");
+  VideoSource(const std::string& name, VideoReader::Kind kind, const VideoReading& reading)
+      : is_stream_(kind == VideoReader::Kind::stream),
+        video_(name, std::chrono::seconds(is_stream_ ? 30 : 5), kind, reading),
+        first_(video_.next()) {
+    if (!first_)
+      throw InputError(name, is_stream_ ? "gives no frames, expected a stream" : "has no frames, expected a video");
   }
 
   std::optional<Frame> next() override {
@@ -102,8 +106,8 @@ class VideoSource : public FrameSource {
     if (image->damaged) frame.flaw = Status::damaged;
     return frame;
   }
-  Kind kind() const override { return Kind::video; }
-  std::optional<int> frame_count() const override { return video_.frame_count(); }
+  Kind kind() const override { return is_stream_ ? Kind::live : Kind::video; }
+  std::optional<int> frame_count() const override { return is_stream_ ? std::nullopt : video_.frame_count(); }
   double frames_per_second() const override { return video_.frames_per_second(); }
   std::string remark() const override { return video_.remark(); }
   bool is_srgb() const override { return video_.is_srgb(); }
@@ -111,35 +115,8 @@ class VideoSource : public FrameSource {
   std::string complaint() const override { return video_.complaint(); }
 
  private:
+  bool is_stream_;
   VideoReader video_;
-  std::optional<VideoReader::Image> first_;
-  int index_ = 0;
-};
-
-class StreamSource : public FrameSource {
- public:
-  StreamSource(const std::string& name, const VideoReading& reading)
-      : stream_(name, std::chrono::seconds(30), VideoReader::Kind::stream, reading), first_(stream_.next()) {
-    if (!first_) throw InputError(name, "gives no frames, expected a stream");
-  }
-
-  std::optional<Frame> next() override {
-    auto image = first_ ? std::exchange(first_, std::nullopt) : stream_.next();
-    if (!image) return std::nullopt;
-    Frame frame{std::move(image->bgr), index_++, image->time_s, {}, {}};
-    if (image->damaged) frame.flaw = Status::damaged;
-    return frame;
-  }
-  Kind kind() const override { return Kind::live; }
-  std::optional<int> frame_count() const override { return std::nullopt; }
-  double frames_per_second() const override { return stream_.frames_per_second(); }
-  std::string remark() const override { return stream_.remark(); }
-  bool is_srgb() const override { return stream_.is_srgb(); }
-  bool is_lossy() const override { return stream_.is_lossy(); }
-  std::string complaint() const override { return stream_.complaint(); }
-
- private:
-  VideoReader stream_;
   std::optional<VideoReader::Image> first_;
   int index_ = 0;
 };
@@ -178,7 +155,8 @@ void refuse_dicom(const fs::path& path) {
 std::unique_ptr<FrameSource> open_frame_source(const std::string& input, double folder_fps,
                                                const VideoReading& reading) {
   using Kind = FrameSource::Kind;
-  if (input.find("://") != std::string::npos) return std::make_unique<StreamSource>(input, reading);
+  if (input.find("://") != std::string::npos)
+    return std::make_unique<VideoSource>(input, VideoReader::Kind::stream, reading);
   std::error_code error;
   const bool exists = fs::exists(input, error);
   if (error == std::errc::permission_denied) throw InputError(input, "can't be looked at: " + error.message());
@@ -191,7 +169,7 @@ std::unique_ptr<FrameSource> open_frame_source(const std::string& input, double 
   if (has_image_extension(input) || has_unread_extension(input))
     return std::make_unique<PictureSource>(Kind::image, Pictures{{{input}}}, folder_fps);
   if (!fs::is_regular_file(input)) throw InputError(input, "is no file, expected an image, a folder or a video");
-  return std::make_unique<VideoSource>(input, reading);
+  return std::make_unique<VideoSource>(input, VideoReader::Kind::file, reading);
 }
 
 }  // namespace lapservo

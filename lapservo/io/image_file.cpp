@@ -71,10 +71,6 @@ bool is_png(std::span<const std::uint8_t> bytes) {
   return starts_with(bytes, std::string_view("\x89PNG\r\n\x1a\n", 8));
 }
 
-bool is_jpeg(std::span<const std::uint8_t> bytes) {
-  return starts_with(bytes, "\xff\xd8");
-}
-
 // The bytes that the file says it has.
 std::size_t least_bytes(std::span<const std::uint8_t> bytes, const std::string& format) {
   constexpr std::size_t riff_header = 8;

@@ -170,6 +170,12 @@ void run(Supervisor& arm, ImageStream& images, Clock& clock, const RunConfig& co
   const auto vision =
       track_images(images, config.rig, config.tracker, config.rcm_px, config.tracking_thread, config.endoscope);
   const double period_s = controller.period_s, start_s = clock.now_s();
+  // A goal of the tip shows other features from where the endoscope is then.
+  const auto features_then = [&](double time_s) {
+    if (trajectory.tip_at(time_s)) tips.use(moving->camera_from_rcm(start_s + time_s));
+    return features.at(time_s);
+  };
+  const Trajectory seen_then{0, features_then, {}};
   const auto ticks = std::lround(duration_s / period_s);
   const BrakesAtTheEnd brakes(arm, clock, controller);
   bool go_on = true;
@@ -190,13 +196,6 @@ void run(Supervisor& arm, ImageStream& images, Clock& clock, const RunConfig& co
     if (tick.seen) tick.input.image = tick.seen->measurement;
     if (moving) {
       vision->set_delay(servo.controller().delay_s());
-      // A goal of the tip shows other features from where the endoscope is then.
-      const Trajectory seen_then{0,
-                                 [&](double time_s) {
-                                   tips.use(moving->camera_from_rcm(start_s + time_s));
-                                   return features.at(time_s);
-                                 },
-                                 {}};
       moving->carry(tick.input, since_s, seen_then, tick.seen ? tick.seen->first_from_camera : Rigid3());
       tips.use(moving->camera_from_rcm(tick.input.time_s));
     }

@@ -9,6 +9,11 @@
 
 namespace lapservo::internal {
 
+/// By its first bytes.
+inline bool is_jpeg(std::span<const std::uint8_t> bytes) {
+  return bytes.size() >= 2 && bytes[0] == 0xff && bytes[1] == 0xd8;
+}
+
 /// A decoder's result for a file: an image in 8-bit BGR (empty when not even its header could be read), and the first
 /// complaint of the decoder (empty: none).
 struct DecodedPicture {

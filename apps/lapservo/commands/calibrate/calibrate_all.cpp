@@ -148,24 +148,19 @@ class Guide {
 
   int run_camera(const CalibrateOptions& options) const {
     CalibrateCameraOptions camera;
-    static_cast<FrameOptions&>(camera) = frame_options_for(options.input);
+    static_cast<FrameOptions&>(camera) = options;
     camera.inputs = {options.input}, camera.rig = options.rig;
     camera.board = {options_.board, options_.aruco, options_.square_mm, {}};
     return calibrate_camera(camera);
   }
 
   // Topics are of bags and sessions.
-  static bool has_topics(const std::string& input) {
+  static bool has_topics([[maybe_unused]] const std::string& input) {
 #ifdef LAPSERVO_BAGS
     return !bag_of(input).empty();
 #else
-    return input.empty();
+    return false;
 #endif
-  }
-  FrameOptions frame_options_for(const std::string& input) const {
-    FrameOptions options = options_;
-    if (!has_topics(input)) options.image_topic.clear();
-    return options;
   }
 
   // As a user types it; where its page goes is no part of what was done.
@@ -176,15 +171,14 @@ class Guide {
     all.insert(all.end(), {step.name, *step.input, "--rig", options_.rig});
     if (!check && !camera) all.insert(all.end(), {"--out", options_.rig});
     if (!step.joints.empty()) all.insert(all.end(), {"--joints", step.joints});
-    const bool of_joints = check || step.name == "registration";
-    const std::string joint_topic = of_joints ? options_of(step).joint_topic : "";
+    const CalibrateOptions options = options_of(step);
     all.insert(all.end(), step.arguments.begin(), step.arguments.end());
     const std::vector<std::pair<std::string, std::string>> of_frames{{"--eye", options_.eye},
                                                                      {"--side-by-side", options_.side_by_side},
                                                                      {"--colour-matrix", options_.colour_matrix},
                                                                      {"--chroma-location", options_.chroma_location},
-                                                                     {"--image-topic", options_of(step).image_topic},
-                                                                     {"--joint-topic", joint_topic}};
+                                                                     {"--image-topic", options.image_topic},
+                                                                     {"--joint-topic", options.joint_topic}};
     for (const auto& [option, value] : of_frames)
       if (!value.empty()) all.insert(all.end(), {option, value});
     if (camera) return all;
@@ -196,9 +190,12 @@ class Guide {
 
   CalibrateOptions options_of(const Step& step) const {
     CalibrateOptions options;
-    static_cast<FrameOptions&>(options) = frame_options_for(*step.input);
+    static_cast<FrameOptions&>(options) = options_;
+    if (!has_topics(*step.input)) options.image_topic.clear();
     options.input = *step.input, options.rig = options_.rig, options.joints = step.joints;
-    if (has_topics(step.joints.empty() ? *step.input : step.joints)) options.joint_topic = options_.joint_topic;
+    const bool with_joints = step.name == "registration" || step.name == "check";
+    if (with_joints && has_topics(step.joints.empty() ? *step.input : step.joints))
+      options.joint_topic = options_.joint_topic;
     if (step.name != "check") options.out = options_.rig;
     options.instrument = options_.instrument;
     if (step.name == "check") options.report = options_.report;
