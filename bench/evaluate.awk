@@ -26,6 +26,7 @@ is_truth {
   key = (file == "" ? value("frame") : number[file]) SUBSEP value("instrument")
   if (value("status") != "ok" || !((key, "file") in truth)) next
   ++found
+  beyond += value("p_false") > 0.001 || value("sigma_roll_rad") > 0.03  # docs/statuses.md
   for (k = 0; k < 4; ++k) {
     edge += square(value("e" k "_u_px") - truth[key, "e" k "_u_px"]) + square(value("e" k "_v_px") - truth[key, "e" k "_v_px"])
     ++edges
@@ -48,4 +49,5 @@ END {
   printf "| %s | %d | %.0f %% | %+.2f | %.2f | %.2f | %.2f | %.2f, %.2f | %.3f | %.3f | %.2f | %d |\n", name, expected,
     100 * found / expected, mean, rms(squares - n * mean * mean, n), rms(squares, n), largest < 0 ? -largest : largest,
     rms(theta, n), rms(phi, n), rms(rho, n), rms(edge, edges), rms(z, n), wrong
+  if (beyond) { printf "%s: %d of %d are ok beyond the limits of ok\n", name, beyond, found > "/dev/stderr"; exit 1 }
 }
