@@ -76,7 +76,8 @@ std::vector<TouchImage> read_touches(const std::filesystem::path& table, const B
 }
 
 TouchMeasurement measure_touches(const Rig& rig, std::size_t instrument, const Tool& tool, const Board& board,
-                                 const std::vector<TouchImage>& images, bool deinterlace, const JobWatch& watch) {
+                                 const std::vector<TouchImage>& images, const OpenImage& open, bool deinterlace,
+                                 const JobWatch& watch) {
   TouchMeasurement result;
   std::vector<BoardCorner> corners;
   std::vector<const TouchImage*> seen;
@@ -84,7 +85,7 @@ TouchMeasurement measure_touches(const Rig& rig, std::size_t instrument, const T
   for (const TouchImage& image : images) {
     watch.tell(static_cast<int>(images.size()), static_cast<int>(&image - images.data()), "");
     if (watch.stopped()) return result.calibration.refusal = "stopped", result;
-    const auto source = open_frame_source(image.file.string(), 1);
+    const auto source = open(image.file.string());
     const FrameRecording recording{*source, image.file.string(), deinterlace};
     if (!image.corner) {
       read_frames(recording, rig, 1, {}, [&](const cv::Mat& bgr, double) {

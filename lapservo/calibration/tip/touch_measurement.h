@@ -2,6 +2,8 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -9,6 +11,7 @@
 #include "lapservo/calibration/camera/board.h"
 #include "lapservo/calibration/recording/frame_recording.h"
 #include "lapservo/calibration/tip/tip_ways.h"
+#include "lapservo/io/frame_source.h"
 #include "lapservo/rig/rig.h"
 
 namespace lapservo::internal {
@@ -24,6 +27,9 @@ struct TouchImage {
 /// column and row the image is one of the board alone. Throws InputError for what is none.
 std::vector<TouchImage> read_touches(const std::filesystem::path& table, const Board& board, const Tool& tool);
 
+/// Opens an image, of which it may give one eye's half.
+using OpenImage = std::function<std::unique_ptr<FrameSource>(const std::string& file)>;
+
 struct TouchMeasurement {
   TipCalibration calibration;               ///< or its refusal
   std::vector<std::string> without_marker;  ///< images that do not count
@@ -32,6 +38,7 @@ struct TouchMeasurement {
 /// Tracks the instrument's marker in the images of touches and finds the board in the others. A chessboard may be found
 /// turned by 180 degrees: the touches show which way it lies. Throws InputError as read_frames().
 TouchMeasurement measure_touches(const Rig& rig, std::size_t instrument, const Tool& tool, const Board& board,
-                                 const std::vector<TouchImage>& images, bool deinterlace, const JobWatch& watch);
+                                 const std::vector<TouchImage>& images, const OpenImage& open, bool deinterlace,
+                                 const JobWatch& watch);
 
 }  // namespace lapservo::internal

@@ -47,7 +47,8 @@ TipCalibration by_touch(const CalibrateTipOptions& options, const Rig& rig, std:
   if (options.board.corners.empty() || !options.board.square_mm)
     throw InputError("--touch", "needs --board and --square-mm, for example --board 9x6 --square-mm 5");
   const Board board = board_of(options.board);
-  const auto measured = measure_touches(rig, index, tool, board, read_touches(options.input, board, tool),
+  const auto open = [&](const std::string& image) { return open_frames(image, options, &rig.camera); };
+  const auto measured = measure_touches(rig, index, tool, board, read_touches(options.input, board, tool), open,
                                         options.deinterlace, watched_job());
   for (const std::string& image : measured.without_marker) std::printf("left out: %s\n", image.c_str());
   return measured.calibration;
