@@ -249,6 +249,10 @@ TEST(ColourOrder, IsTheSameReversedOrAnother) {
                            {usual, {95, 172, 268}, true, false},
                            {{359, 120, 240}, {1, 120, 240}, true, false},
                            {usual, {265, 185, 95}, false, true},
+                           {usual, {95, 172, 330}, true, false},
+                           {usual, {30, 180, 270}, true, false},
+                           {usual, {270, 180, 30}, false, true},
+                           {usual, {90, 225, 270}, false, false},
                            {usual, {180, 270, 90}, false, false},
                            {usual, {270, 90, 180}, false, false}}) {
     Marker a, b;

@@ -113,9 +113,10 @@ std::optional<FieldProblem> marker_problem(const Marker& marker) {
 }
 
 bool same_colour_order(const Marker& a, const Marker& b) {
-  for (std::size_t i = 0; i < 3; ++i)
-    if (hue_gap_deg(a.hues_deg[i], b.hues_deg[i]) >= min_hue_gap_deg / 2) return false;
-  return true;
+  const auto alike = [&](std::size_t band) {
+    return hue_gap_deg(a.hues_deg[band], b.hues_deg[band]) < min_hue_gap_deg / 2;
+  };
+  return alike(1) && (alike(0) || alike(2));
 }
 
 bool reversed_colour_order(const Marker& a, const Marker& b) {

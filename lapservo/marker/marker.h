@@ -73,10 +73,11 @@ bool is_printed(const Marker& marker, double tau_rad);
 /// ask whether the cross-ratio can be decoded: see CrossRatioDecoder.
 std::optional<FieldProblem> marker_problem(const Marker& marker);
 
-/// Two markers whose bands have the same hues in the same places can't be distinguished by colour.
+/// Two markers whose middle bands and one band more have the same hues in the same places can't be distinguished by
+/// colour: blood may hide the third.
 bool same_colour_order(const Marker& a, const Marker& b);
 
-/// Nor can two whose orders are reversals of one another: each looks like the other turned end for end.
+/// Nor can two of which one is so when it is reversed: each looks like the other turned end for end.
 bool reversed_colour_order(const Marker& a, const Marker& b);
 
 }  // namespace lapservo

@@ -22,10 +22,10 @@ void check_camera(const Camera& camera) {
 
 std::optional<FieldProblem> hues_problem(const Marker& marker, const Instrument& other) {
   if (same_colour_order(marker, other.marker))
-    return FieldProblem{"hues_deg", "the order of " + other.name,
+    return FieldProblem{"hues_deg", "like that of " + other.name + " in the middle band and one more",
                         "another order of colours: it is what names the instrument"};
   if (reversed_colour_order(marker, other.marker))
-    return FieldProblem{"hues_deg", "the order of " + other.name + " reversed",
+    return FieldProblem{"hues_deg", "like that of " + other.name + " reversed in the middle band and one more",
                         "another middle colour: turned end for end, the two look the same"};
   return std::nullopt;
 }

@@ -261,10 +261,12 @@ const Complaints confusable_instruments{
     {good + second_instrument("PSM1", "[180, 270, 90]"),
      "instruments[1].name: is PSM1, expected a name that no other instrument has"},
     {good + second_instrument("PSM2", "[95, 175, 265]"),
-     "instruments[1].marker.hues_deg: is the order of PSM1, expected another order of colours: it is what names the "
+     "instruments[1].marker.hues_deg: is like that of PSM1 in the middle band and one more, expected another order of "
+     "colours: it is what names the "
      "instrument"},
     {good + second_instrument("PSM2", "[265, 185, 95]"),
-     "instruments[1].marker.hues_deg: is the order of PSM1 reversed, expected another middle colour: turned end for "
+     "instruments[1].marker.hues_deg: is like that of PSM1 reversed in the middle band and one more, expected another "
+     "middle colour: turned end for "
      "end, the two look the same"},
 };
 

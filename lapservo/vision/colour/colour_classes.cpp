@@ -15,24 +15,27 @@ std::optional<double> hue_deg_of(double b, double g, double r) {
   return 240 + 60 * (r - g) / chroma;
 }
 
-ColourClasses::ColourClasses(const std::vector<Instrument>& instruments) {
-  for (const Instrument& instrument : instruments) {
-    std::array<std::uint8_t, 3> band_classes{};
-    for (std::size_t band = 0; band < 3; ++band) {
-      const double hue_deg = instrument.marker.hues_deg[band];
-      auto same = std::find_if(hues_deg_.begin(), hues_deg_.end(), [&](double other_deg) {
+ColourClasses::ColourClasses(const std::vector<Instrument>& instruments) : bands_(instruments.size()) {
+  struct Hue {
+    double deg;
+    std::uint8_t colour;
+    double reach_deg = colour_limits.widest_reach_deg;
+  };
+  std::vector<Hue> hues;
+  std::vector<double> first_deg;  // of each colour: hues count as alike by their first, so that they form no chains
+  for (const Instrument& instrument : instruments)
+    for (const double hue_deg : instrument.marker.hues_deg) {
+      auto same = std::find_if(first_deg.begin(), first_deg.end(), [&](double other_deg) {
         return hue_gap_deg(hue_deg, other_deg) < colour_limits.merge_deg;
       });
-      if (same == hues_deg_.end()) same = hues_deg_.insert(hues_deg_.end(), hue_deg);
-      band_classes[band] = static_cast<std::uint8_t>(1 + (same - hues_deg_.begin()));
+      if (same == first_deg.end()) same = first_deg.insert(first_deg.end(), hue_deg);
+      hues.push_back({hue_deg, static_cast<std::uint8_t>(1 + (same - first_deg.begin()))});
     }
-    bands_.push_back(band_classes);
-  }
-
-  std::vector<double> reach_deg(hues_deg_.size(), colour_limits.widest_reach_deg);
-  for (std::size_t i = 0; i < hues_deg_.size(); ++i)
-    for (std::size_t j = 0; j < hues_deg_.size(); ++j)
-      if (i != j) reach_deg[i] = std::min(reach_deg[i], hue_gap_deg(hues_deg_[i], hues_deg_[j]) / 2);
+  count_ = static_cast<int>(first_deg.size());
+  for (std::size_t i = 0; i < hues.size(); ++i) bands_[i / 3][i % 3] = hues[i].colour;
+  for (Hue& hue : hues)
+    for (const Hue& other : hues)
+      if (hue.colour != other.colour) hue.reach_deg = std::min(hue.reach_deg, hue_gap_deg(hue.deg, other.deg) / 2);
 
   constexpr int levels = 1 << bits;
   table_.resize(static_cast<std::size_t>(levels) * levels * levels, 0);
@@ -41,9 +44,10 @@ ColourClasses::ColourClasses(const std::vector<Instrument>& instruments) {
     for (int g = 0; g < levels; ++g)
       for (int r = 0; r < levels; ++r) {
         const auto hue_deg = hue_deg_of(centre(b), centre(g), centre(r));
-        for (std::size_t i = 0; hue_deg && i < hues_deg_.size(); ++i)
-          if (hue_gap_deg(*hue_deg, hues_deg_[i]) < reach_deg[i])
-            table_[static_cast<std::size_t>(b << 2 * bits | g << bits | r)] = static_cast<std::uint8_t>(i + 1);
+        if (!hue_deg) continue;
+        for (const Hue& hue : hues)
+          if (hue_gap_deg(*hue_deg, hue.deg) < hue.reach_deg)
+            table_[static_cast<std::size_t>(b << 2 * bits | g << bits | r)] = hue.colour;
       }
 }
 

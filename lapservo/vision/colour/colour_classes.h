@@ -24,8 +24,9 @@ inline constexpr ColourLimits colour_limits;
 std::optional<double> hue_deg_of(double b, double g, double r);
 
 /// Which of the markers' colours a pixel has: 0 for none, else 1, 2, ... for the rig's distinct hues. A pixel has a
-/// colour when it is colourful and its HSV hue lies nearer to it than half the way to the next, so that exposure,
-/// shading and moderate white balance need no tuning. Looked up from the 5 high bits of each channel: 32 KiB.
+/// colour when it is colourful and its HSV hue lies nearer to one of its hues than half the way to another colour's, so
+/// that exposure, shading and moderate white balance need no tuning. Looked up from the 5 high bits of each channel: 32
+/// KiB.
 class ColourClasses {
  public:
   explicit ColourClasses(const std::vector<Instrument>& instruments);
@@ -40,7 +41,7 @@ class ColourClasses {
   std::uint8_t of_band(std::size_t instrument, std::size_t band) const { return bands_[instrument][band]; }
   /// Those of an instrument's three bands.
   const std::array<std::uint8_t, 3>& of_bands(std::size_t instrument) const { return bands_[instrument]; }
-  int count() const { return static_cast<int>(hues_deg_.size()); }
+  int count() const { return count_; }
 
  private:
   static constexpr int bits = 5, shift = 8 - bits;
@@ -48,7 +49,7 @@ class ColourClasses {
     return static_cast<std::size_t>((bgr[0] >> shift) << 2 * bits | (bgr[1] >> shift) << bits | (bgr[2] >> shift));
   }
 
-  std::vector<double> hues_deg_;
+  int count_ = 0;
   std::vector<std::array<std::uint8_t, 3>> bands_;
   std::vector<std::uint8_t> table_;
 };

@@ -100,6 +100,30 @@ TEST(ColourClasses, ReachAsFarToEitherSideOfAHue) {
   }
 }
 
+// Of other instruments, too, however their hues lie beside one another.
+TEST(ColourClasses, EachBandHasItsOwnClass) {
+  Random random(5);
+  for (int i = 0; i < 200; ++i) {
+    std::vector<Hues> designs_of_rig(3);
+    for (Hues& hues_deg : designs_of_rig) {
+      const double first_deg = random.uniform(0, 360), second_deg = first_deg + random.uniform(40, 150);
+      hues_deg = {first_deg, std::fmod(second_deg, 360), std::fmod(second_deg + random.uniform(40, 150), 360)};
+    }
+    const ColourClasses classes = classes_of(designs_of_rig);
+    for (std::size_t k = 0; k < designs_of_rig.size(); ++k)
+      for (std::size_t band = 0; band < 3; ++band) {
+        double nearest_deg = 360;
+        for (const Hues& others_deg : designs_of_rig)
+          for (const double other_deg : others_deg)
+            if (const double gap_deg = hue_gap_deg(other_deg, designs_of_rig[k][band]); gap_deg > 0)
+              nearest_deg = std::min(nearest_deg, gap_deg);
+        if (nearest_deg < 8) continue;  // of the table's steps
+        EXPECT_EQ(classes(from_hsv(designs_of_rig[k][band], 1, 0.9).data()), classes.of_band(k, band))
+            << "seed 5, " << i;
+      }
+  }
+}
+
 // Exposure, shading and white balance act on light: the print's classes stand them.
 TEST(ColourClasses, APrintKeepsItsClassUnderOtherLight) {
   const Hues hues_deg{90, 180, 270};
