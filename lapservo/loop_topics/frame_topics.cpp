@@ -107,12 +107,12 @@ void FrameTopics::publish(std::size_t index, const Observation& seen, const std:
   }
   const bool has_q = seen.rcm && camera_from_rcm;
   if (seen.status != Status::ok || (!has_q && !seen.marker)) return;
-  PoseMessage pose = has_q ? pose_message(told.instrument, *seen.rcm) : pose_message(*seen.marker);
+  PoseMessage pose = seen.marker ? pose_message(*seen.marker) : pose_message(told.instrument, *seen.rcm);
   pose.stamp_s = stamp_s;
   pose.frame = told.names.camera;
   told.pose(pose);
   const Rigid3 camera_from_marker =
-      has_q ? camera_from_marker_at(told.instrument, seen.rcm->q) : seen.marker->camera_from_marker;
+      seen.marker ? seen.marker->camera_from_marker : camera_from_marker_at(told.instrument, seen.rcm->q);
   TransformsMessage frames{stamp_s, {{told.names.camera, told.names.marker, camera_from_marker}}};
   std::optional<JointVector> q;
   if (has_q) {

@@ -210,6 +210,8 @@ Marker parse_marker(const YamlField& field) {
   if (const YamlField skew = field["skew_m"]; skew.present()) marker.skew_m = skew.number("a length in metres");
   if (const YamlField gap = field["gap_rad"]; gap.present()) marker.gap_rad = gap.number("an angle in radians");
   marker.sigmas = parse_marker_sigmas(field);
+  if (marker.sigmas.bands_upper_m.has_value() != marker.sigmas.bands_lower_m.has_value())
+    field.fail("measured at one end alone", "sigma_bands_upper_m and sigma_bands_lower_m, both or neither");
   if (const auto problem = marker_problem(marker)) field.fail_within(*problem);
   if (const std::string problem = decoding_problem(marker); !problem.empty())
     field.fail("not decodable", "bands whose cross-ratio is monotonic over the rotation: " + problem);

@@ -22,7 +22,8 @@ const char* usual_cause(Status status) {
              "focal length with the camera's";
     case Status::uncertain:
       return "the marker is too small, too dark, blurred or compressed for psi; come nearer, more light, a shorter "
-             "exposure, less compression";
+             "exposure, less compression, and where the rig's sigma_camera_matrix or sigma_response is large, lapservo "
+             "calibrate camera";
     case Status::marker_mismatch:
       return "the print is not as the rig says; lapservo calibrate marker measures it from a slow turn";
     case Status::damaged:

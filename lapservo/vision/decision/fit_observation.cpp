@@ -57,7 +57,8 @@ std::optional<RcmPrior> doubted(const RcmPrior& registration, const ShaftPose& p
   return wide;
 }
 
-std::optional<Observation::Rcm> rcm_of(const FineFit& fit, const RcmPrior* registration) {
+// `sigma_seam_rad`: of the print's place on the shaft, which psi depends on and the marker's pose does not.
+std::optional<Observation::Rcm> rcm_of(const FineFit& fit, const RcmPrior* registration, double sigma_seam_rad) {
   if (!registration) return std::nullopt;
   const auto known =
       fit.unknowns.through_rcm() ? std::optional(*registration) : doubted(*registration, fit.unknowns.pose());
@@ -65,6 +66,7 @@ std::optional<Observation::Rcm> rcm_of(const FineFit& fit, const RcmPrior* regis
   const auto estimate = configuration_estimate(fit.unknowns, fit.covariance, *known, fit.with_registration);
   if (!estimate) return std::nullopt;
   Observation::Rcm rcm{estimate->q, estimate->covariance};
+  rcm.covariance(3, 3) += sigma_seam_rad * sigma_seam_rad;
   rcm.q.theta_rad = wrap_pi(rcm.q.theta_rad), rcm.q.psi_rad = wrap_pi(rcm.q.psi_rad);
   return rcm;
 }
@@ -122,7 +124,7 @@ Observation observation_of(const Scene& scene, const FineFit& fit) {
       line->ideal_px, registration ? projected_rcm_px(scene.camera, registration->camera_from_rcm) : std::nullopt);
   observation.p_false = fit.p_false;
   observation.marker = marker_pose_of(scene.marker, fit.unknowns, fit.covariance);
-  observation.rcm = rcm_of(fit, registration);
+  observation.rcm = rcm_of(fit, registration, scene.marker.sigmas.seam_rad.value_or(0));
   const ShaftPose told = observation.rcm ? in_azimuths_of(pose, observation.rcm->q.psi_rad) : pose;
   observation.camera_from_unrolled = told.camera_from_unrolled;
   observation.psi_rad = told.psi_rad;

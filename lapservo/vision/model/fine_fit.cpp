@@ -235,7 +235,7 @@ CommonErrors Fitter::errors_of(const ResidualLines& lines) const {
     const DepartedLight seen(light_, fit_.departure);
     by_exponent_px = moved_by_exponent_px(seen.light(), pass_.all, located_with_.boundaries_px());
   }
-  errors.rig = RigErrors(scene_.camera, scene_.marker, by_exponent_px);
+  errors.rig = RigErrors(scene_.camera, scene_.marker, fit_.unknowns.pose(), by_exponent_px);
   return errors;
 }
 

@@ -13,14 +13,9 @@ double sigma_exponent(const Response& response) {
   return response.sigma.value_or(0) / value_by_exponent;
 }
 
-// By how much each boundary lies aside where the bands' errors add up, in proportion to its place: that looks like no
-// rotation.
-std::array<double, 4> moved_by_length_m(const std::array<double, 3>& bands_m, const std::array<double, 3>& sigmas_m) {
-  const double fraction =
-      std::accumulate(sigmas_m.begin(), sigmas_m.end(), 0.0) / std::accumulate(bands_m.begin(), bands_m.end(), 0.0);
-  std::array<double, 4> moved_m{};
-  for (std::size_t k = 0; k < bands_m.size(); ++k) moved_m[k + 1] = moved_m[k] + fraction * bands_m[k];
-  return moved_m;
+// The part by which bands are off whose errors add up.
+double common_part(const std::array<double, 3>& bands_m, const std::array<double, 3>& sigmas_m) {
+  return std::accumulate(sigmas_m.begin(), sigmas_m.end(), 0.0) / std::accumulate(bands_m.begin(), bands_m.end(), 0.0);
 }
 
 }  // namespace
@@ -28,15 +23,29 @@ std::array<double, 4> moved_by_length_m(const std::array<double, 3>& bands_m, co
 bool has_sigmas(const Camera& camera, const Marker& marker) {
   CameraSigmas geometry = camera.sigmas;
   geometry.blue = geometry.red = 0;
-  return geometry != CameraSigmas{} || camera.response.sigma || marker.measured_sigma_m();
+  return geometry != CameraSigmas{} || camera.response.sigma || marker.measured_sigma_m() || marker.sigmas.diameter_m ||
+         marker.sigmas.wrap_m || marker.sigmas.gap_rad;
 }
 
-RigErrors::RigErrors(const Camera& camera, const Marker& marker, const std::array<double, 4>& by_exponent_px)
+RigErrors::RigErrors(const Camera& camera, const Marker& marker, const ShaftPose& pose,
+                     const std::array<double, 4>& by_exponent_px)
     : camera_(&camera) {
-  if (marker.measured_sigma_m()) {
-    const auto upper_m = moved_by_length_m(marker.bands_upper_m, *marker.sigmas.bands_upper_m),
-               lower_m = moved_by_length_m(marker.bands_lower_m, *marker.sigmas.bands_lower_m);
-    for (std::size_t k = 0; k < length_m_.size(); ++k) length_m_[k] = {upper_m[k], lower_m[k]};
+  const MarkerSigmas& sigmas = marker.sigmas;
+  const bool measured = marker.measured_sigma_m().has_value();
+  const double upper = measured ? common_part(marker.bands_upper_m, *sigmas.bands_upper_m) : 0,
+               lower = measured ? common_part(marker.bands_lower_m, *sigmas.bands_lower_m) : 0,
+               wrap_m = sigmas.wrap_m.value_or(0), gap_rad = sigmas.gap_rad.value_or(0),
+               wider = sigmas.diameter_m.value_or(0) / marker.diameter_m;
+  // A thicker shaft looks like a nearer one whose print is shorter.
+  const Rigid3& placed = pose.camera_from_unrolled;
+  nearer_m_ = wider * (placed.rotation.conjugate() * placed.translation);
+  const std::array<double, 4> upper_m = boundaries_m(marker, 0), slopes_m = boundary_slopes_m(marker);
+  for (std::size_t k = 0; k < upper_m.size(); ++k) {
+    const double lower_m = upper_m[k] + marker.covered_rad() * slopes_m[k];
+    along_m_[0][k] = {upper * upper_m[k], lower * (lower_m - marker.wrap_m)};
+    along_m_[1][k] = {0, wrap_m};
+    along_m_[2][k] = {0, gap_rad * slopes_m[k]};
+    along_m_[3][k] = {wider * upper_m[k], wider * lower_m};
   }
   for (std::size_t k = 0; k < 4; ++k) response_px_[k] = sigma_exponent(camera.response) * by_exponent_px[k];
 }
@@ -53,17 +62,16 @@ RigErrors::Shifts RigErrors::of(const Measurement& measurement) const {
   const double by_fx = along(x, 0) * sigma.fx_px, by_fy = along(0, y) * sigma.fy_px, common = std::sqrt(1.0 / 3),
                own = std::sqrt(2.0 / 3);
   const auto& k = sigma.distortion;
-  const bool of_print = measurement.group < length_m_.size();
+  const bool of_print = measurement.group < response_px_.size();
   const double turned = measurement.turn_fraction;
-  const auto length = [&](std::size_t group) {
-    return measurement.along_px_per_m * ((1 - turned) * length_m_[group][0] + turned * length_m_[group][1]);
-  };
+  const Eigen::Vector2d edges = measurement.along_px_per_m * Eigen::Vector2d(1 - turned, turned);
+  const auto of_print_px = [&](std::size_t i) { return of_print ? edges.dot(along_m_[i][measurement.group]) : 0; };
   Shifts shifts;
   shifts << common * (by_fx + by_fy), own * by_fx, own * by_fy, along(sigma.cx_px, 0), along(0, sigma.cy_px),
       k[0] * distorted(x * r2, y * r2), k[1] * distorted(x * r2 * r2, y * r2 * r2),
       k[2] * distorted(2 * x * y, r2 + 2 * y * y), k[3] * distorted(r2 + 2 * x * x, 2 * x * y),
       k[4] * distorted(x * r2 * r2 * r2, y * r2 * r2 * r2), of_print ? response_px_[measurement.group] : 0,
-      of_print ? length(measurement.group) : 0;
+      of_print_px(0), of_print_px(1), of_print_px(2), of_print_px(3) + measurement.row.segment<3>(2).dot(nearer_m_);
   return shifts;
 }
 

@@ -218,30 +218,33 @@ double tau_from(const CrossRatioDecoder& decoder, const Edges& e) {
   return decoder.tau_rad(cross_ratio((e[1] - e[0]).norm(), (e[2] - e[1]).norm(), (e[3] - e[2]).norm()));
 }
 
-// One boundary moved along the line by one sigma.
-Edges moved(const Edges& edges, std::size_t k) {
-  Edges changed = edges;
-  changed[k] += boundary_sigma_px * (edges[3] - edges[0]).normalized();
-  return changed;
-}
+using EdgesVector = Eigen::Matrix<double, 8, 1>;
 
-// Each boundary errs along the line by itself; all turn and shift across with it.
-EdgesCovariance covariance_of(const Edges& edges) {
+// What is uncertain of the boundaries, one sigma each: each errs along the line by itself, by `along_px`; all turn and
+// shift across with the line's ends.
+std::array<EdgesVector, 6> errors_of(const Edges& edges, double along_px) {
   const double length_px = (edges[3] - edges[0]).norm();
   const Eigen::Vector2d along = (edges[3] - edges[0]) / length_px, across(-along.y(), along.x());
-  EdgesCovariance covariance = EdgesCovariance::Zero();
-  const auto add = [&](const Eigen::Matrix<double, 8, 1>& error) { covariance += error * error.transpose(); };
-  Eigen::Matrix<double, 8, 1> at_first, at_last;
+  std::array<EdgesVector, 6> errors;
+  errors.fill(EdgesVector::Zero());
   for (std::size_t k = 0; k < 4; ++k) {
     const Eigen::Index place = 2 * static_cast<Eigen::Index>(k);
-    Eigen::Matrix<double, 8, 1> own = Eigen::Matrix<double, 8, 1>::Zero();
-    own.segment<2>(place) = boundary_sigma_px * along;
-    add(own);
     const double fraction = (edges[k] - edges[0]).norm() / length_px;
-    at_first.segment<2>(place) = (1 - fraction) * across_sigma_px * across;
-    at_last.segment<2>(place) = fraction * across_sigma_px * across;
+    errors[k].segment<2>(place) = along_px * along;
+    errors[4].segment<2>(place) = (1 - fraction) * across_sigma_px * across;
+    errors[5].segment<2>(place) = fraction * across_sigma_px * across;
   }
-  add(at_first), add(at_last);
+  return errors;
+}
+
+Edges moved(Edges edges, const EdgesVector& error) {
+  for (std::size_t k = 0; k < 4; ++k) edges[k] += error.segment<2>(2 * static_cast<Eigen::Index>(k));
+  return edges;
+}
+
+EdgesCovariance covariance_of(const Edges& edges) {
+  EdgesCovariance covariance = EdgesCovariance::Zero();
+  for (const EdgesVector& error : errors_of(edges, boundary_sigma_px)) covariance += error * error.transpose();
   return covariance;
 }
 
@@ -259,12 +262,15 @@ std::optional<Observation> observe_edges(const Camera& camera, const Instrument&
       o.features.cross_ratio > decoder.highest_cross_ratio() + room)
     return std::nullopt;
   o.tau_rad = tau_from(decoder, edges);
-  double tau_variance = 0;
-  for (std::size_t k = 0; k < 4; ++k) tau_variance += std::pow(tau_from(decoder, moved(edges, k)) - o.tau_rad, 2);
+  const double print_px = instrument.marker.boundary_sigma_m() * o.features.l_px / instrument.marker.length_m();
+  const auto errors = errors_of(edges, std::hypot(boundary_sigma_px, print_px));
   // At the ends of its range tau is clamped and its derivative lost: there the mean slope over the turn stands in.
-  double ratio_variance = 0;
-  for (std::size_t k = 0; k < 4; ++k)
-    ratio_variance += std::pow(features_of(moved(edges, k), std::nullopt).cross_ratio - o.features.cross_ratio, 2);
+  double tau_variance = 0, ratio_variance = 0;
+  for (const EdgesVector& error : errors) {
+    const Edges changed = moved(edges, error);
+    tau_variance += std::pow(tau_from(decoder, changed) - o.tau_rad, 2);
+    ratio_variance += std::pow(features_of(changed, std::nullopt).cross_ratio - o.features.cross_ratio, 2);
+  }
   const double mean_slope = two_pi / (decoder.highest_cross_ratio() - decoder.lowest_cross_ratio());
   o.sigma_tau_rad = std::sqrt(std::max(tau_variance, mean_slope * mean_slope * ratio_variance));
   if (!camera_from_rcm) {
@@ -278,8 +284,8 @@ std::optional<Observation> observe_edges(const Camera& camera, const Instrument&
   const auto q = configuration_from(camera, marker, *camera_from_rcm, edges, o.tau_rad);
   if (!q) return std::nullopt;
   Observation::Rcm rcm{*q, Eigen::Matrix4d::Zero()};
-  for (std::size_t k = 0; k < 4; ++k) {
-    const Edges changed = moved(edges, k);
+  for (const EdgesVector& error : errors) {
+    const Edges changed = moved(edges, error);
     const auto other = configuration_from(camera, marker, *camera_from_rcm, changed, tau_from(decoder, changed));
     if (!other) return std::nullopt;
     const Eigen::Vector4d change = configuration_change(*q, *other);
@@ -289,7 +295,9 @@ std::optional<Observation> observe_edges(const Camera& camera, const Instrument&
     return configuration_from(camera, marker, changed, edges, o.tau_rad);
   });
   rcm.covariance += slopes * registration_covariance(instrument) * slopes.transpose();
-  rcm.covariance(3, 3) = std::max(rcm.covariance(3, 3), o.sigma_tau_rad * o.sigma_tau_rad);
+  const double sigma_seam_rad = marker.sigmas.seam_rad.value_or(0);
+  rcm.covariance(3, 3) =
+      std::max(rcm.covariance(3, 3), o.sigma_tau_rad * o.sigma_tau_rad) + sigma_seam_rad * sigma_seam_rad;
   rcm.covariance.diagonal().array() += 1e-12;
   o.rcm = rcm;
   o.camera_from_unrolled = *camera_from_rcm * rcm_from_unrolled(*q);
