@@ -87,11 +87,6 @@ void refuse_at_once(const Supervisor& arm, const Clock& clock, const RunConfig& 
     throw InputError("Clock", "now_s", fmt::format("{}", now_s), "a finite time");
 }
 
-// Others still bring it to where the loop will begin.
-bool is_on_its_way(Blocked blocked) {
-  return blocked == Blocked::not_enabled || blocked == Blocked::not_homed || blocked == Blocked::busy;
-}
-
 // Refuses what only the first joints and the first image show, before they move anything.
 class FirstSight {
  public:
@@ -103,7 +98,8 @@ class FirstSight {
     if (tick.seen && !std::exchange(saw_image_, true))
       refuse_other_clock("ImageStream", tick.seen->image.time_s, tick.input.time_s);
     const JointState& joints = tick.input.joints;
-    if (!joints.q.vector().allFinite() || is_on_its_way(joints.blocked) || std::exchange(saw_joints_, true)) return;
+    // While it is held, others still bring it to where the loop will begin.
+    if (!joints.q.vector().allFinite() || arm.held() || std::exchange(saw_joints_, true)) return;
     refuse_other_clock("JointState", joints.time_s, tick.input.time_s);
     if (arm.is_simulated() && !joints.follows) return;
     refuse_goal(trajectory_, duration_s_, config_.rig, config_.rig.instruments.at(0).camera_from_rcm, controller_,

@@ -66,9 +66,9 @@ class RunObserver {
 ///
 /// Throws InputError before anything moves: without RunConfig::arm_limits where the arm is not simulated; for a
 /// duration or a clock's time that is not finite; for joints or a first image stamped more than a second ahead of the
-/// clock; and, as soon as the joints of an arm that is enabled, homed and not busy are known, for a trajectory that
-/// can't be followed from there (refuse_infeasible()), unless nothing is moved: the arm is simulated and does not
-/// follow; or for a goal of the tip that can't be reached, with the nearest place that can.
+/// clock; and, as soon as the arm is not held until a start and its joints are known, for a trajectory that can't be
+/// followed from there (refuse_infeasible()), unless nothing is moved: the arm is simulated and does not follow; or for
+/// a goal of the tip that can't be reached, with the nearest place that can.
 ///
 /// A goal of the tip needs the rig's camera_from_rcm and tool. Across the line of sight the image closes it: in steady
 /// state the image of the tip, by the seen marker, lies on the goal's. Along it, in depth, the registration counts.

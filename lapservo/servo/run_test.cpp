@@ -23,6 +23,7 @@
 #include "lapservo/core/random.h"
 #include "lapservo/geometry/rotation.h"
 #include "lapservo/robot/steady_clock.h"
+#include "lapservo/robot/supervisor.h"
 #include "lapservo/servo/convergence.h"
 #include "lapservo/servo/image_features.h"
 #include "lapservo/servo/image_window.h"
@@ -824,7 +825,7 @@ struct Refused {
   double duration_s = 1;
   double joints_ahead_s = 0, images_ahead_s = 0;
   double homing_s = 0;
-  bool clock_in_order = true;
+  bool clock_in_order = true, held_by_page = false;
 };
 
 // The refusal of a run, in which nothing moved.
@@ -840,8 +841,10 @@ std::string refusal_of(const Refused& refused) {
   AheadArm arm(simulator, refused.joints_ahead_s, refused.homing_s);
   OtherClock others(simulator, refused.images_ahead_s, refused.clock_in_order);
   Watcher watcher(rig, simulator);
-  const std::string said =
-      testing::input_error([&] { run(arm, others, others, config, refused.trajectory, refused.duration_s, watcher); });
+  Supervisor supervisor(arm, others);
+  if (refused.held_by_page) supervisor.stop(Commander::page);
+  const std::string said = testing::input_error(
+      [&] { run(supervisor, others, others, config, refused.trajectory, refused.duration_s, watcher); });
   EXPECT_TRUE(said.empty() || simulator.measured_jp() == before) << said;
   EXPECT_EQ(said.find('\n'), std::string::npos) << said;
   return said;
@@ -859,6 +862,7 @@ TEST(Run, RefusesWhatCanNotBeFollowedNamingTimeAndLimit) {
     EXPECT_EQ(refusal_of({.trajectory = set_point({0.9, 397, 182, 106}), .homing_s = homing_s}), "");
     EXPECT_NE(refusal_of({.trajectory = set_point({3, 1e4, 1e4, 5e3}), .homing_s = homing_s}), "");
   }
+  EXPECT_EQ(refusal_of({.trajectory = set_point({0.9, 397, 182, 106}), .homing_s = 0.3, .held_by_page = true}), "");
 }
 
 TEST(Run, RefusesFeaturesThatNoImageShowsInEveryMode) {
