@@ -58,6 +58,7 @@ void TipGoals::follow(const JointState& joints) {
   const Eigen::Vector4d q = joints.q.vector();
   if (!q.allFinite()) return;
   q_ = q;
+  if (joints.started) psi_by_ = PsiBy::joints;  // while it was held, others may have rolled it
   if (psi_by_ == PsiBy::joints) psi_rad_ = q[3];
   follow_wrist(joints.wrist_rad, joints.time_s);
 }

@@ -32,7 +32,8 @@ class TipGoals {
   /// holds the tip at the goal, the features rest where they were, and are NaN before the first.
   Trajectory features_of(const Trajectory& goal);
 
-  /// A state of the joints: where the wrist is, how it moves; the psi of a roll that is free until an image has it.
+  /// A state of the joints: where the wrist is, how it moves; the psi of a roll that is free until an image has it,
+  /// anew from every start on.
   void follow(const JointState& joints);
   /// The registration from now on; nullopt while it is measured anew.
   void use(const std::optional<Rigid3>& camera_from_rcm);

@@ -183,7 +183,7 @@ TEST(TipGoals, FollowTheWrist) {
   }
 }
 
-TEST(TipGoals, AFreeRollStaysWhereTheImageHasIt) {
+TEST(TipGoals, AFreeRollStaysWhereTheImageHasItSinceTheStart) {
   const Rig rig = rig_with(straight_tool());
   TipGoals tips(rig, {});
   JointVector misread = there;
@@ -197,7 +197,16 @@ TEST(TipGoals, AFreeRollStaysWhereTheImageHasIt) {
   JointVector turned = there;
   turned.psi_rad += 0.1;  // a disturbance: the roll does not give way to it
   tips.see(Truth{rig}.image_of(turned, 6, rig), *rig.instruments[0].camera_from_rcm);
-  EXPECT_NEAR(tips.configuration({Truth{rig}.tip_at(there, {})})->psi_rad, there.psi_rad + two_pi, 1e-6);
+  const auto psi_rad = [&] { return tips.configuration({Truth{rig}.tip_at(there, {})})->psi_rad; };
+  EXPECT_NEAR(psi_rad(), there.psi_rad + two_pi, 1e-6);
+  JointState rolled = joints_at(7, misread);  // by a hand while the arm was held
+  rolled.q.psi_rad += 0.6, turned.psi_rad = there.psi_rad + 0.6;
+  rolled.started = true;
+  tips.follow(rolled);
+  features.at(7);
+  EXPECT_NEAR(psi_rad(), rolled.q.psi_rad, 1e-6);
+  tips.see(Truth{rig}.image_of(turned, 7, rig), *rig.instruments[0].camera_from_rcm);
+  EXPECT_NEAR(psi_rad(), turned.psi_rad + two_pi, 1e-6);
 }
 
 class Refusals : public ::testing::Test {
