@@ -124,14 +124,14 @@ void add_tip(ControlTick& tick, const Instrument& instrument, const TipGoals& ti
 }
 
 // Corrects goals of the tip by an image that the loop has used.
-void watch_tip(ControlTick& tick, const Trajectory& trajectory, double start_s,
+void watch_tip(ControlTick& tick, const Trajectory& trajectory, double begun_s,
                const std::optional<Rigid3>& first_from_rcm, TipGoals& tips) {
   if (!tick.seen || !first_from_rcm || tick.decision.control.reason != HoldReason::none) return;
   const ImageMeasurement& image = tick.seen->measurement;
   if (image.registration != tick.decision.registration) return;
   tips.see(image, tick.seen->first_from_camera.inverse() * *first_from_rcm);
   const double exposed_s = image.time_s - tick.decision.control.delay_s;
-  const auto goal = trajectory.tip_at(exposed_s - start_s);
+  const auto goal = trajectory.tip_at(exposed_s - begun_s);
   if (goal && image.found) tick.tip_error_px = tips.error_px(image, *goal, exposed_s - tick.input.time_s);
 }
 
@@ -166,9 +166,10 @@ void run(Supervisor& arm, ImageStream& images, Clock& clock, const RunConfig& co
   const auto vision =
       track_images(images, config.rig, config.tracker, config.rcm_px, config.tracking_thread, config.endoscope);
   const double period_s = controller.period_s, start_s = clock.now_s();
+  double begun_s = start_s, since_s = 0;  // the trajectory's
   // A goal of the tip shows other features from where the endoscope is then.
   const auto features_then = [&](double time_s) {
-    if (trajectory.tip_at(time_s)) tips.use(moving->camera_from_rcm(start_s + time_s));
+    if (trajectory.tip_at(time_s)) tips.use(moving->camera_from_rcm(begun_s + time_s));
     return features.at(time_s);
   };
   const Trajectory seen_then{0, features_then, {}};
@@ -183,7 +184,11 @@ void run(Supervisor& arm, ImageStream& images, Clock& clock, const RunConfig& co
     if (images.take_second_sender()) arm.report(Blocked::second_camera);
     tick.input.readings = arm.readings();
     tick.input.joints = arm.state();
-    const double since_s = tick.input.time_s - start_s;
+    if (arm.armed())
+      since_s = tick.input.time_s - begun_s;
+    else if (std::isfinite(tick.input.time_s))
+      begun_s = tick.input.time_s - since_s;
+    tick.trajectory_s = since_s;
     tips.follow(tick.input.joints);
     if (moving) tips.use(moving->camera_from_rcm(tick.input.time_s));
     tick.input.desired = features.at(since_s);
@@ -200,7 +205,7 @@ void run(Supervisor& arm, ImageStream& images, Clock& clock, const RunConfig& co
     if (tick.decision.release) arm.release();
     tell(arm, tick.decision);
     add_tip(tick, config.rig.instruments.at(0), tips);
-    watch_tip(tick, trajectory, start_s, first_from_rcm, tips);
+    watch_tip(tick, trajectory, begun_s, first_from_rcm, tips);
     if (tick.decision.registration != registration) {
       registration = tick.decision.registration;
       vision->use(tick.decision);

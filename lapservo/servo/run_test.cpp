@@ -693,6 +693,32 @@ TEST(Run, WhatVisionThrowsInItsOwnThreadEndsTheRunAndReleasesTheArm) {
   EXPECT_TRUE(arm.released);
 }
 
+TEST(Run, TheTrajectoryStandsWhileTheArmIsHeld) {
+  struct Person : RunObserver {
+    bool on_tick(const ControlTick& tick) override {
+      if (ticks == 20) arm.stop(Commander::page);
+      if (ticks == 5 || ticks == 40) arm.start(Commander::page, tick.input.time_s);
+      moved += ticks++ > 0 && arm.armed();
+      EXPECT_NEAR(tick.trajectory_s, moved / 60.0, 1e-9);
+      const Eigen::Vector4d then = small_trajectory().at(moved / 60.0).features;
+      EXPECT_LT((tick.input.desired.features - then).norm(), 1e-6) << ticks;
+      return true;
+    }
+    Supervisor& arm;
+    int ticks = 0, moved = 0;
+    explicit Person(Supervisor& of) : arm(of) {}
+  };
+  const Rig rig = testing::small_test_rig();
+  Simulator simulator(rig, {}, start);
+  Supervisor arm(simulator, simulator);
+  arm.stop(Commander::page);
+  Person person(arm);
+  run(arm, simulator, simulator, config_of(rig, {}), small_trajectory(), 1, person);
+  EXPECT_EQ(person.ticks, 60);
+  EXPECT_GT(person.moved, 20);
+  EXPECT_LT(person.moved, 40);
+}
+
 TEST(Run, NeedsTheLimitsOfAnArmThatIsNotSimulated) {
   class Real : public OperatedArm {
    public:

@@ -21,22 +21,23 @@ void ChangingGoal::want(const std::string& name, double duration_s, Trajectory t
   wanted_ = Wanted{name, duration_s, std::move(trajectory)};
 }
 
-std::optional<std::string> ChangingGoal::follow(const ControlTick& tick, double time_s) {
-  auto said = result(tick.decision, time_s);
+std::optional<std::string> ChangingGoal::follow(const ControlTick& tick) {
+  auto said = result(tick);
   check_next(tick);
   return said;
 }
 
-std::optional<std::string> ChangingGoal::result(const ServoDecision& decision, double time_s) {
+std::optional<std::string> ChangingGoal::result(const ControlTick& tick) {
   if (!refusal_.valid() || refusal_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return std::nullopt;
   const std::string refusal = refusal_.get();
-  if (asked_.registration != decision.registration) {
+  if (asked_.registration != tick.decision.registration) {
     if (!wanted_) wanted_ = asked_;  // it was checked for an earlier place of the endoscope
     return std::nullopt;
   }
   if (!refusal.empty()) return "refused: " + refusal;
-  *now_ = {0, [at = asked_.trajectory.at, time_s](double now_s) { return at(now_s - time_s); },
-           [asked = asked_.trajectory, time_s](double now_s) { return asked.tip_at(now_s - time_s); }};
+  const double from_s = tick.trajectory_s;
+  *now_ = {0, [at = asked_.trajectory.at, from_s](double now_s) { return at(now_s - from_s); },
+           [asked = asked_.trajectory, from_s](double now_s) { return asked.tip_at(now_s - from_s); }};
   const std::string& name = asked_.name;
   return std::string("a ") +
          (name == "tip_goal"    ? "goal of the tip"

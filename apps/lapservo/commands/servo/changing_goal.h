@@ -20,8 +20,8 @@ class ChangingGoal {
 
   /// Begins once it has been checked, at its time 0; the one wanted last counts. `name`: set_point, tip_goal, ...
   void want(const std::string& name, double duration_s, Trajectory trajectory);
-  /// Once a tick, `time_s` after the first one: what there is to say of what was wanted.
-  std::optional<std::string> follow(const ControlTick& tick, double time_s);
+  /// Once a tick: what there is to say of what was wanted.
+  std::optional<std::string> follow(const ControlTick& tick);
 
  private:
   struct Wanted {
@@ -30,7 +30,7 @@ class ChangingGoal {
     Trajectory trajectory;
     int registration = 0;  ///< ServoDecision::registration when it was requested
   };
-  std::optional<std::string> result(const ServoDecision& decision, double time_s);
+  std::optional<std::string> result(const ControlTick& tick);
   void check_next(const ControlTick& tick);
 
   const RunConfig& run_;

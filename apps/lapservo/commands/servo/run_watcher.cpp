@@ -35,7 +35,7 @@ void RunWatcher::follow_goal(ChangingGoal& goal, const ControlTick& tick, double
   try {
     if (const auto wanted = page_ ? page_->tip_goal() : std::nullopt)
       goal.want("tip_goal", 0, tip_set_point(*wanted, "tip_goal"));
-    said = goal.follow(tick, time_s);
+    said = goal.follow(tick);
   } catch (const InputError& error) {
     said = std::string("refused: ") + error.what();
   }
