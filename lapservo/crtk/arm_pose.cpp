@@ -33,12 +33,13 @@ ArmPose::~ArmPose() {
 
 void ArmPose::take(const PlaceMessage& message, bool local) {
   constexpr double plain = 1e-3;  // the norm's rounding
-  const double arrival_s = clock_.now_s();
   const auto& [rotation, translation] = message.pose;
   if (!translation.allFinite() || !(std::abs(rotation.norm() - 1) < plain)) return;
   const std::lock_guard lock(mutex_);
-  if (local_ && !local) return;
-  const bool other_topic = local && !local_;
+  const double arrival_s = clock_.now_s();
+  const bool other_topic = local != local_;
+  if (other_topic && (local_ || arrival_s - first_s_ > FirstSender::silence_s)) return;
+  first_s_ = std::min(first_s_, arrival_s);
   local_ = local;
   if (other_topic) sender_ = {};
   const FirstSender::Verdict verdict = sender_.hear(message.source, arrival_s);
@@ -57,7 +58,8 @@ bool ArmPose::has_two_senders() const {
 
 std::optional<Rigid3> ArmPose::newest() const {
   const std::lock_guard lock(mutex_);
-  return poses_.empty() ? std::nullopt : std::optional(poses_.back().pose);
+  const bool may_change = !local_ && clock_.now_s() - first_s_ <= FirstSender::silence_s;
+  return poses_.empty() || may_change ? std::nullopt : std::optional(poses_.back().pose);
 }
 
 std::optional<Rigid3> ArmPose::at(double time_s) const {

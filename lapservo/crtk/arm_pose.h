@@ -1,6 +1,7 @@
 #pragma once
 
 #include <deque>
+#include <limits>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -14,15 +15,16 @@
 
 namespace lapservo::internal {
 
-/// The pose that a CRTK arm reports: local/measured_cp, or measured_cp of an arm that has no other. Poses that are not
-/// finite, or whose rotation is none, do not count; while two programs publish, nobody's do.
+/// The pose that a CRTK arm reports: local/measured_cp, or measured_cp of an arm of which no other came within
+/// FirstSender::silence_s after it; from then on the topic stays, as the other's base may be another one. Poses that
+/// are not finite, or whose rotation is none, do not count; while two programs publish, nobody's do.
 class ArmPose {
  public:
   /// `arm`: as in CrtkRobot. The transport and the clock must outlive it.
   ArmPose(Transport& transport, const std::string& arm, const Clock& clock);
   ~ArmPose();
 
-  /// nullopt while none has come.
+  /// nullopt while none has come, or the topic may change.
   std::optional<Rigid3> newest() const;
   /// On the clock, by stamps (StampClock): within the last 3 s interpolated, up to 0.1 s after the newest extrapolated
   /// by the motion of the last 0.05 s; else nullopt.
@@ -41,6 +43,7 @@ class ArmPose {
   StampClock stamps_;
   std::deque<Pose> poses_;
   bool local_ = false;
+  double first_s_ = std::numeric_limits<double>::infinity();  // when a pose came
   FirstSender sender_;
   std::vector<Transport::Subscription> subscriptions_;  // last: they use the others
 };

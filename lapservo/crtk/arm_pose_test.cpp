@@ -24,14 +24,29 @@ class ArmPoseTest : public ::testing::Test {
   StandingClock clock_;  // as far on as the messages are
 };
 
-TEST_F(ArmPoseTest, IsTheArmsOwnWhereThereIsOne) {
+TEST_F(ArmPoseTest, IsTheArmsOwnWhereThatComesInTime) {
   const ArmPose pose(transport_, "/dvrk/ECM", clock_);
   EXPECT_FALSE(pose.newest());
   say("/dvrk/ECM/measured_cp", 1, at(1));
-  EXPECT_EQ(pose.newest()->translation.x(), 1);
-  say("/dvrk/ECM/local/measured_cp", 2, at(2));
+  EXPECT_FALSE(pose.newest());
+  say("/dvrk/ECM/local/measured_cp", 1.4, at(2));
   say("/dvrk/ECM/measured_cp", 3, at(3));
   EXPECT_EQ(pose.newest()->translation.x(), 2);
+}
+
+// The two topics may count from other bases.
+TEST_F(ArmPoseTest, AnEndoscopeThatHasBegunStaysWithItsTopic) {
+  const ArmPose arm(transport_, "ECM", clock_);
+  HeldEndoscope endoscope(arm);
+  say("/ECM/measured_cp", 1, at(1));
+  EXPECT_FALSE(endoscope.begin());
+  say("/ECM/measured_cp", 1.6, at(1));
+  ASSERT_TRUE(endoscope.begin());
+  say("/ECM/local/measured_cp", 1.62, at(1.01));
+  say("/ECM/measured_cp", 1.64, at(1));
+  const auto moved = endoscope.first_from_camera(1.65);
+  ASSERT_TRUE(moved);
+  EXPECT_LT(moved->translation.norm(), 1e-9);
 }
 
 TEST_F(ArmPoseTest, OneThatIsNoneDoesNotCount) {
