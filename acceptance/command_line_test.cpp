@@ -412,6 +412,13 @@ TEST_F(CommandLine, ServoRefusesWhatCanNotBe) {
   expect_refused(servo + " --robot sim --operator-present /pedal", {"--operator-present", "/pedal", "page"});
   expect_refused(servo + " --robot ros2:PSM1 --enable-motion", {"--enable-motion", "--joint-limits"});
   expect_refused("servo --replay in/log.csv", {"rig.yaml"});
+  const std::string bag = " --replay " + in("run.bag", "#ROSBAG V2.0\n");
+  for (const std::string of_arm : {"--camera /dev/video0", "--control topics", "--enable-motion",
+                                   "--endoscope ros2:ECM", "--setpoint-readers 2", "--tf-frames a,b,c,d"})
+    for (const std::string& without : {bag, std::string(" --robot sim")})
+      expect_refused(servo + without + " " + of_arm, {of_arm.substr(0, of_arm.find(' ')).c_str(), "is of an arm"});
+  expect_refused(servo + bag + " --robot sim --seed 2", {"--seed", "no --replay"});
+  expect_refused(servo + " --robot sim --rcm-px 200,150", {"--rcm-px", "--method uncalibrated"});
 }
 
 TEST_F(CommandLine, ExperimentsWriteAReport) {

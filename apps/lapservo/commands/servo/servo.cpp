@@ -165,12 +165,18 @@ void refuse_idle(const ServoOptions& options, const std::vector<std::string>& gi
     for (const std::string& name : given)
       if (std::find(names.begin(), names.end(), name) != names.end()) throw InputError(name, why);
   };
-  if (options.replay.empty())
+  const bool recorded = !options.replay.empty(), simulated = options.robot == "sim";
+  if (!recorded)
     refuse({"--image-topic", "--joint-topic", "--eye", "--side-by-side"},
            "is of a recording, expected --replay with it");
-  if (options.robot != "sim")
+  if (recorded || !simulated)
     refuse({"--start", "--seed", "--latency-ms", "--registration-error", "--hide"},
-           "is of the simulator, expected --robot sim with it");
+           "is of the simulator, expected --robot sim with it and no --replay");
+  if (recorded || simulated)
+    refuse({"--camera", "--endoscope", "--enable-motion", "--setpoint-readers", "--tf-frames"},
+           "is of an arm, expected --robot ros2:NAMESPACE or ros1:NAMESPACE with it and no --replay");
+  if (recorded || (simulated && !options.web.port))
+    refuse({"--control"}, "is of an arm or a page, expected --robot of an arm or --web with it and no --replay");
 }
 
 int run(const ServoOptions& options, const std::vector<std::string>& given) {
@@ -179,18 +185,11 @@ int run(const ServoOptions& options, const std::vector<std::string>& given) {
   const bool recorded = !bag_of(options.replay).empty();
   if (!options.replay.empty() && options.web.port)
     throw InputError("--web", "is for runs, expected none with --replay");
-  if (!options.endoscope.empty() && (options.robot == "sim" || !options.replay.empty()))
-    throw InputError("--endoscope", "is " + options.endoscope + ", expected none without an arm of a topic");
-  if (!options.replay.empty() && options.enable_motion)
-    throw InputError("--enable-motion", "moves nothing that was recorded, expected none with --replay");
   if (!options.replay.empty() && !recorded) return replay_log(options, given);
   if (options.rig.empty())
     throw InputError("--rig", "is missing, expected a rig's YAML, for example configs/paper.yaml");
   refuse_idle(options, given);
   if (recorded) return decide_on_recording(options);
-  if (options.robot == "sim" && !options.camera.empty())
-    throw InputError("--camera",
-                     "is " + options.camera + ", which the simulator does not read, expected none with sim");
   if (!options.hide.empty() && !(options.hide[0] < options.hide[1]))
     throw InputError("--hide", "expected from,to in seconds, the later one last");
   if (options.robot == "sim") return simulate(options);

@@ -175,6 +175,8 @@ RunConfig run_config_of(const ServoOptions& options) {
   RunConfig run;
   run.rig = steered_rig(options);
   run.controller = controller_of(options, run.rig);
+  if (run.controller.mode != ControlMode::uncalibrated && !options.rcm_px.empty())
+    throw InputError("--rcm-px", "is of another method, expected --method uncalibrated with it");
   if (options.robot == "sim" || run.controller.mode != ControlMode::uncalibrated)
     run.rig = single_instrument(std::move(run.rig), options.rig);
   run.trajectory_name = trajectory_name(options);
