@@ -42,7 +42,7 @@ void TipGoals::refuse_incomplete(const std::string& source, bool has_joints) con
   const auto refuse = [&](const std::string& what) {
     throw InputError(source, "is a goal of the tip, which needs " + what);
   };
-  if (!rig_.instruments[0].camera_from_rcm) refuse("the rig's camera_from_rcm");
+  if (!rig_.instruments[0].camera_from_rcm) refuse("the rig's camera_from_rcm and a method other than uncalibrated");
   if (!tool || !tool->place) refuse("the rig's `tool` with its place");
   if (!has_joints || wrist_.size() == tool->wrist.size()) return;
   refuse(fmt::format("the wrist's joints, but the arm does not measure {}", fmt::join(wrist_names(tool), ", ")));

@@ -284,6 +284,8 @@ TEST_F(Refusals, SayWhatIsMissing) {
   EXPECT_NE(refused({here_m}).find("the arm does not measure wrist_pitch, wrist_yaw"), std::string::npos);
   rig.instruments[0].tool.reset();
   EXPECT_NE(refused({here_m}).find("`tool`"), std::string::npos);
+  rig.instruments[0].camera_from_rcm.reset();
+  EXPECT_NE(refused({here_m}).find("camera_from_rcm and a method other than uncalibrated"), std::string::npos);
 }
 
 }  // namespace

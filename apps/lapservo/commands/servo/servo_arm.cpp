@@ -172,7 +172,7 @@ int steer_arm(const ServoOptions& options) {
   const Trajectory trajectory = trajectory_of(options);
 
   std::optional<ServoPage> page;
-  if (options.web.port) page.emplace(options, rig, "servo " + options.robot, options.enable_motion);
+  if (options.web.port) page.emplace(options, config.rig, "servo " + options.robot, options.enable_motion);
 
   Transports transports("lapservo");
   SteadyClock clock;
