@@ -12,7 +12,6 @@
 #include <optional>
 #include <string>
 #include <utility>
-#include <vector>
 
 #include <opencv2/core.hpp>
 
@@ -135,8 +134,7 @@ bool convert(const GstVideoFrame& frame, cv::Mat& bgr) {
         .copyTo(bgr);
     return true;
   }
-  const auto found = std::find_if(layouts.begin(), layouts.end(),
-                                  [&](const Layout& known) { return known.format == GST_VIDEO_INFO_FORMAT(&info); });
+  const auto found = std::ranges::find(layouts, GST_VIDEO_INFO_FORMAT(&info), &Layout::format);
   if (found == layouts.end()) return false;
   YuvPicture picture{found->layout, bgr.size()};
   for (guint i = 0; i < GST_VIDEO_FRAME_N_PLANES(&frame); ++i) {

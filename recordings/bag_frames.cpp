@@ -13,14 +13,6 @@
 #include "recordings/bag_topics.h"
 
 namespace lapservo::internal {
-namespace {
-
-DecodedImage decoded(BagMessage message) {
-  if (auto* raw = std::get_if<ImageMessage>(&message)) return decode(std::move(*raw));
-  return decode(std::get<CompressedImageMessage>(message));
-}
-
-}  // namespace
 
 BagFrames::BagFrames(std::shared_ptr<const Bag> bag, const std::string& topic)
     : bag_(std::move(bag)), topic_(image_topic_of(*bag_, topic)), messages_(bag_->messages(topic_)) {
@@ -38,7 +30,8 @@ std::optional<BagFrames::Picture> BagFrames::read() {
   while (auto message = messages_.next()) {
     if (const auto* compressed = std::get_if<CompressedImageMessage>(&message->message); compressed && !first_)
       is_jpeg_ = is_jpeg(compressed->data);
-    DecodedImage image = decoded(std::move(message->message));
+    auto* raw = std::get_if<ImageMessage>(&message->message);
+    DecodedImage image = raw ? decode(std::move(*raw)) : decode(std::get<CompressedImageMessage>(message->message));
     if (auto* bgr = std::get_if<cv::Mat>(&image)) return Picture{message->time_s, std::move(*bgr)};
     if (unreadable_++ == 0) why_unreadable_ = std::get<BadImage>(image).why;
   }

@@ -1,19 +1,190 @@
 #include <algorithm>
+#include <array>
+#include <cstdint>
 #include <filesystem>
 #include <iterator>
 #include <map>
 #include <optional>
 #include <set>
+#include <string>
 #include <utility>
+#include <zlib.h>
 
 #include <fmt/format.h>
 
 #include "lapservo/core/error.h"
-#include "recordings/mcap_messages.h"
+#include "recordings/chunk_compression.h"
+#include "recordings/file_bytes.h"
+#include "recordings/mcap_format.h"
+#include "recordings/ros2_file.h"
 
 namespace lapservo::internal {
 using namespace mcap;
 namespace {
+
+[[noreturn]] void refuse_damage(const FileBytes& file, std::uint64_t at) {
+  throw InputError(file.path(),
+                   fmt::format("is damaged at byte {}, expected a whole MCAP recording: copy it again, or try "
+                               "`mcap recover`",
+                               at));
+}
+
+std::optional<std::string> text_taken(ByteView& from) {
+  const auto text = block_taken(from);
+  return text ? std::optional(std::string(text->begin(), text->end())) : std::nullopt;
+}
+
+// The channels of an MCAP file by their numbers. The first record of each counts.
+struct McapChannels {
+  std::map<std::uint16_t, std::string> types;  ///< by the schema
+  std::map<std::uint16_t, Ros2FileTopic> topics;
+
+  // Takes records of schemas and channels, passes over others. False for those that are too short.
+  bool add(Op op, ByteView content) {
+    if (op != Op::schema && op != Op::channel) return true;
+    const auto number = taken<std::uint16_t>(content);
+    const auto schema = op == Op::channel ? taken<std::uint16_t>(content) : std::optional<std::uint16_t>(0);
+    const auto name = text_taken(content), format = text_taken(content);
+    if (!number || !schema || !format) return false;
+    if (op == Op::schema) return types.emplace(*number, *name), true;
+    const auto type = types.find(*schema);
+    topics.try_emplace(*number, Ros2FileTopic{*name, type == types.end() ? std::string() : type->second, *format});
+    return true;
+  }
+};
+
+// Whether the bytes have that checksum, which 0 leaves open.
+bool has_mcap_crc(ByteView bytes, std::uint32_t crc) {
+  return crc == 0 || crc == crc32_z(0, bytes.data(), bytes.size());
+}
+
+// The messages of a part of an MCAP file, those of a chunk in its place. One chunk at a time is in memory.
+class McapMessages {
+ public:
+  struct Message {
+    std::uint16_t channel = 0;
+    std::uint64_t time_ns = 0;
+  };
+
+  // From the record at byte `begin` on. `may_end_early`: `end` may be within a record, as where a recorder was killed;
+  // of a chunk there, the whole messages count.
+  McapMessages(FileBytes& file, std::uint64_t begin, std::uint64_t end, bool may_end_early)
+      : file_(file), at_(begin), end_(end), may_end_early_(may_end_early) {}
+
+  // nullopt at the end. Throws InputError for what is damaged.
+  std::optional<Message> next() {
+    while (!rest_.empty() || at_ < end_)
+      if (const auto message = rest_.empty() ? next_in_file() : next_in_chunk()) return message;
+    return std::nullopt;
+  }
+
+  // The latest message's, until next().
+  ByteView data() {
+    if (data_at_ == 0) return data_;
+    auto bytes = file_.bytes(data_at_, data_size_);
+    if (!bytes) refuse_damage(file_, data_at_);
+    loose_ = std::move(*bytes);
+    data_at_ = 0;
+    return data_ = loose_;
+  }
+
+  // Those seen so far.
+  const McapChannels& channels() const { return channels_; }
+  // The first byte that is in no whole record.
+  std::optional<std::uint64_t> ends_early_at() const { return ends_early_at_; }
+  // Whether the end of the messages has been seen, which a recorder that was killed does not write.
+  bool is_finished() const { return is_finished_; }
+
+ private:
+  static std::optional<Message> message_taken(ByteView& from) {
+    const auto channel = taken<std::uint16_t>(from);
+    taken<std::uint32_t>(from);  // its sequence number
+    const auto recorded_ns = taken<std::uint64_t>(from), published_ns = taken<std::uint64_t>(from);
+    if (!published_ns) return std::nullopt;
+    return Message{*channel, *recorded_ns};
+  }
+
+  std::optional<Message> next_in_chunk() {
+    const auto op = taken<Op>(rest_);
+    const auto content = block_taken<std::uint64_t>(rest_);
+    data_ = content.value_or(ByteView()), data_at_ = 0;
+    const auto message = op == Op::message ? message_taken(data_) : std::nullopt;
+    if (content && op != Op::none && (message || op != Op::message) && channels_.add(*op, *content)) return message;
+    if (!ends_early_at_) refuse_damage(file_, chunk_at_);
+    rest_ = {};
+    return std::nullopt;
+  }
+
+  std::optional<Message> next_in_file() {
+    const std::uint64_t begin = at_, left = end_ - begin;
+    const auto head = file_.bytes(begin, std::min(left, record_head));
+    if (!head) refuse_damage(file_, begin);
+    ByteView from(*head);
+    const auto op = taken<Op>(from);
+    const auto size = taken<std::uint64_t>(from);
+    const bool is_whole = size && op != Op::none && *size <= left - record_head;
+    is_finished_ = is_whole && (op == Op::data_end || op == Op::footer);
+    at_ = is_whole && !is_finished_ ? begin + record_head + *size : end_;
+    if (!is_whole) {
+      if (!may_end_early_) refuse_damage(file_, begin);
+      ends_early_at_ = begin;
+      if (size && op == Op::chunk) open_chunk(begin, left - record_head);
+      return std::nullopt;
+    }
+    if (op == Op::chunk) open_chunk(begin, *size);
+    if (op == Op::schema || op == Op::channel) {
+      const auto content = file_.bytes(begin + record_head, *size);
+      if (!content || !channels_.add(*op, *content)) refuse_damage(file_, begin);
+    }
+    if (op != Op::message) return std::nullopt;
+    const auto fields = file_.bytes(begin + record_head, std::min(*size, message_head));
+    ByteView of_message = fields ? ByteView(*fields) : ByteView();
+    const auto message = message_taken(of_message);
+    if (!message) refuse_damage(file_, begin);
+    data_at_ = begin + record_head + message_head, data_size_ = *size - message_head;
+    return message;
+  }
+
+  void open_chunk(std::uint64_t at, std::uint64_t size) {
+    chunk_at_ = at;
+    auto bytes = size <= most_of_a_chunk ? file_.bytes(at + record_head, size) : std::nullopt;
+    if (!bytes) refuse_damage(file_, at);
+    chunk_ = std::move(*bytes);
+    if (unpack_chunk()) return;
+    rest_ = {};
+    if (!ends_early_at_) refuse_damage(file_, at);
+  }
+
+  // False for what is damaged. One that ends early has no checksum.
+  bool unpack_chunk() {
+    ByteView from(chunk_);
+    taken<std::array<std::uint64_t, 2>>(from);  // its times
+    const auto size = taken<std::uint64_t>(from);
+    const auto crc = taken<std::uint32_t>(from);
+    const auto compression = text_taken(from);
+    const auto packed_size = taken<std::uint64_t>(from);
+    if (!packed_size || *size > most_of_a_chunk) return false;
+    from = from.first(std::min<std::uint64_t>(*packed_size, from.size()));
+    const bool is_whole = !ends_early_at_ && from.size() == *packed_size;
+    rest_ = from;
+    if (!compression->empty()) {
+      auto content = inflated(*compression, from, *size);
+      if (!content) return false;
+      chunk_ = std::move(*content);
+      rest_ = chunk_;
+    }
+    return ends_early_at_ || (is_whole && rest_.size() == *size && has_mcap_crc(rest_, *crc));
+  }
+
+  FileBytes& file_;
+  std::uint64_t at_, end_, chunk_at_ = 0;
+  bool may_end_early_, is_finished_ = false;
+  std::optional<std::uint64_t> ends_early_at_;
+  McapChannels channels_;
+  Bytes chunk_, loose_;
+  ByteView rest_, data_;                       // within chunk_; data_ may be loose_
+  std::uint64_t data_at_ = 0, data_size_ = 0;  // of a message outside of chunks that is not in loose_ yet
+};
 
 using ChannelNumbers = std::set<std::uint16_t>;
 
@@ -219,10 +390,9 @@ class McapFile : public Ros2File {
       return std::make_unique<MessagesInPlace>(path_, contents_.all, std::move(wanted),
                                                contents_.ends_early_at.has_value());
     std::vector<Part> chunks;
-    std::copy_if(contents_.chunks.begin(), contents_.chunks.end(), std::back_inserter(chunks), [&](const Part& chunk) {
-      return chunk.channels.empty() || std::any_of(wanted.begin(), wanted.end(), [&](std::uint16_t number) {
-               return chunk.channels.contains(number);
-             });
+    std::ranges::copy_if(contents_.chunks, std::back_inserter(chunks), [&](const Part& chunk) {
+      const auto has = [&](std::uint16_t number) { return chunk.channels.contains(number); };
+      return chunk.channels.empty() || std::ranges::any_of(wanted, has);
     });
     return std::make_unique<IndexedMessages>(path_, std::move(chunks), std::move(wanted));
   }

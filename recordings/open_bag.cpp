@@ -6,8 +6,7 @@
 #include "lapservo/core/error.h"
 #include "recordings/bag_endings.h"
 #ifdef LAPSERVO_BAGS
-#include "recordings/ros1_bag.h"
-#include "recordings/ros2_bag.h"
+#include "recordings/ros_bags.h"
 #include "recordings/session.h"
 #endif
 

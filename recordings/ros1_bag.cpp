@@ -1,5 +1,3 @@
-#include "recordings/ros1_bag.h"
-
 #include <algorithm>
 #include <cstring>
 #include <map>
@@ -10,6 +8,7 @@
 #include "lapservo/core/error.h"
 #include "recordings/chunk_compression.h"
 #include "recordings/file_bytes.h"
+#include "recordings/ros_bags.h"
 #include "transports/ros1/ros1_decoder.h"
 
 namespace lapservo::internal {

@@ -1,5 +1,3 @@
-#include "recordings/ros2_bag.h"
-
 #include <algorithm>
 #include <filesystem>
 #include <map>
@@ -12,7 +10,7 @@
 #include "lapservo/core/error.h"
 #include "recordings/bag_endings.h"
 #include "recordings/ros2_file.h"
-#include "recordings/ros2_metadata.h"
+#include "recordings/ros_bags.h"
 #include "transports/ros2/cdr_decoder.h"
 
 namespace lapservo::internal {
@@ -43,9 +41,7 @@ class Ros2Messages : public BagMessages {
           if (from_.empty() || from_.back().file != part.file.get() || from_.back().type != one.type)
             from_.push_back({part.file.get(), one.type, one.first_ns});
         }
-    if (by_time)
-      std::stable_sort(from_.begin(), from_.end(),
-                       [](const From& a, const From& b) { return a.first_ns < b.first_ns; });
+    if (by_time) std::ranges::stable_sort(from_, {}, &From::first_ns);
   }
 
   std::optional<BagMessage> next() override {

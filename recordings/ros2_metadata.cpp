@@ -1,5 +1,3 @@
-#include "recordings/ros2_metadata.h"
-
 #include <algorithm>
 #include <string>
 #include <system_error>
@@ -11,6 +9,7 @@
 
 #include "lapservo/core/error.h"
 #include "recordings/bag_endings.h"
+#include "recordings/ros2_file.h"
 
 namespace lapservo::internal {
 namespace fs = std::filesystem;

@@ -1,6 +1,5 @@
 #include "recordings/session.h"
 
-#include <algorithm>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
@@ -68,13 +67,13 @@ std::optional<std::int64_t> preferred_time_ns(const json& frame) {
   return time_in(times, "recorder_reception_ns");
 }
 
-struct Sidecar {
-  std::string layout;
+struct Part {
+  std::string video, layout;
   std::vector<std::int64_t> times_ns;  // of the frames
 };
 
-Sidecar read_sidecar(const fs::path& path) {
-  Sidecar sidecar;
+Part read_sidecar(const fs::path& path) {
+  Part sidecar;
   std::size_t wrong = 0;
   // A frame's record has 20 numbers, an hour 100,000 of them: none is kept.
   const auto take_frame = [&](int depth, json::parse_event_t event, json& parsed) {
@@ -92,11 +91,6 @@ Sidecar read_sidecar(const fs::path& path) {
                                  sidecar.times_ns.size(), wrong));
   return sidecar;
 }
-
-struct Part {
-  std::string video;
-  std::vector<std::int64_t> times_ns;
-};
 
 class SessionFrames : public FrameSource {
  public:
@@ -138,7 +132,12 @@ class SessionFrames : public FrameSource {
   std::string remark() const override { return video_->remark(); }
   bool is_srgb() const override { return video_->is_srgb(); }
   bool is_lossy() const override { return video_->is_lossy(); }
-  std::string complaint() const override { return fmt::format("{}", fmt::join(complaints(), "; ")); }
+  std::string complaint() const override {
+    std::vector<std::string> all = complaints_;
+    if (not_later_ > 0)
+      all.push_back(fmt::format("{} frames are left out, whose time is not later than the one before", not_later_));
+    return fmt::format("{}", fmt::join(all, "; "));
+  }
 
  private:
   std::int64_t first_ns() const { return parts_.front().times_ns.front(); }
@@ -154,13 +153,6 @@ class SessionFrames : public FrameSource {
       complaints_.push_back(fmt::format("{} has {} frames and {} times: they may not belong together", name, in_part_,
                                         part.times_ns.size()));
   }
-  std::vector<std::string> complaints() const {
-    std::vector<std::string> all = complaints_;
-    if (not_later_ > 0)
-      all.push_back(fmt::format("{} frames are left out, whose time is not later than the one before", not_later_));
-    return all;
-  }
-
   std::vector<Part> parts_;
   VideoReading reading_;
   std::unique_ptr<FrameSource> video_;
@@ -210,9 +202,10 @@ Session::Session(const std::string& folder, const std::string& stream, const Vid
   const json found = stream_of(folder, stream);
   for (const json& video : list_in(found, "videos")) {
     const fs::path file = beside(folder, text_in(video, "file"));
-    Sidecar sidecar = read_sidecar(fs::path(file).replace_extension(".json"));
-    layout_ = sidecar.layout == "LR" || sidecar.layout == "RL" ? sidecar.layout : std::string();
-    parts.push_back({file.string(), std::move(sidecar.times_ns)});
+    Part part = read_sidecar(fs::path(file).replace_extension(".json"));
+    part.video = file.string();
+    layout_ = part.layout == "LR" || part.layout == "RL" ? part.layout : std::string();
+    parts.push_back(std::move(part));
   }
   frames_ = std::make_unique<SessionFrames>(std::move(parts), reading);
 }

@@ -25,12 +25,8 @@ std::string message(std::string_view source, std::string_view field, std::string
                     std::string_view expected) {
   std::string text(source);
   if (!source.empty() && !field.empty()) text.append(": ");
-  text.append(field)
-      .append(": is ")
-      .append(value.empty() ? "empty" : shortened(value))
-      .append(", expected ")
-      .append(expected);
-  return text;
+  text.append(field) += ": is " + (value.empty() ? "empty" : shortened(value)) + ", expected ";
+  return text.append(expected);
 }
 
 }  // namespace

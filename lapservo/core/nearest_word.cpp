@@ -30,8 +30,7 @@ const std::string& nearest_word(std::string_view word, const std::vector<std::st
   const auto distance = [&](const std::string& other) {
     return std::pair(!other.starts_with(word), edit_distance(word, other));
   };
-  return *std::min_element(words.begin(), words.end(),
-                           [&](const std::string& a, const std::string& b) { return distance(a) < distance(b); });
+  return *std::ranges::min_element(words, {}, distance);
 }
 
 }  // namespace lapservo::internal

@@ -4,7 +4,6 @@
 #include <cstring>
 #include <string>
 #include <sys/stat.h>
-#include <system_error>
 #include <unistd.h>
 
 #include "lapservo/core/error.h"
@@ -21,9 +20,9 @@ void remove_empty(const std::vector<fs::path>& parents_first) {
 
 NewFolder::NewFolder(fs::path path) : path_(std::move(path)) {
   if (path_.empty()) throw InputError("output", "has no name, expected a folder to write");
-  const auto fail = [&](int error) {
+  const auto fail = [&](const char* problem, int error) {
     remove_empty(made_);
-    throw InputError(path_.string(), std::string("can't be made a folder: ") + std::strerror(error));
+    throw InputError(path_.string(), std::string(problem) + ": " + std::strerror(error));
   };
   fs::path so_far;
   for (const fs::path& part : path_) {
@@ -34,14 +33,10 @@ NewFolder::NewFolder(fs::path path) : path_(std::move(path)) {
     }
     const int error = errno;  // of a folder that is there this may be EEXIST, EROFS, EACCES or EISDIR
     struct stat status {};
-    if (::stat(so_far.c_str(), &status) != 0) fail(error);
-    if (!S_ISDIR(status.st_mode)) fail(ENOTDIR);
+    if (::stat(so_far.c_str(), &status) != 0) fail("can't be made a folder", error);
+    if (!S_ISDIR(status.st_mode)) fail("can't be made a folder", ENOTDIR);
   }
-  if (::access(path_.c_str(), W_OK | X_OK) != 0) {
-    const int error = errno;
-    remove_empty(made_);
-    throw InputError(path_.string(), std::string("can't be written: ") + std::strerror(error));
-  }
+  if (::access(path_.c_str(), W_OK | X_OK) != 0) fail("can't be written", errno);
 }
 
 NewFolder::~NewFolder() {

@@ -11,13 +11,15 @@
 
 namespace lapservo::internal {
 
-/// A row of the report for the results of each method (anything with a `method`), said by `text_of`.
-template <class Results, class TextOf>
-Comparison compared(std::string what, std::string paper, const Results& results, const TextOf& text_of) {
-  Comparison row{std::move(what), std::move(paper), "", ""};
-  for (const auto& result : results)
-    (result.method == Method::centerline ? row.centerline : row.surface) = text_of(result);
-  return row;
+/// Makes rows of the report of the results of each method (anything with a `method`), said by `text_of`.
+template <class Results>
+auto comparing(const Results& results) {
+  return [&results](std::string what, std::string paper, const auto& text_of) {
+    Comparison row{std::move(what), std::move(paper), "", ""};
+    for (const auto& result : results)
+      (result.method == Method::centerline ? row.centerline : row.surface) = text_of(result);
+    return row;
+  };
 }
 
 /// "1.49 ± 1.2 px": three digits of the mean, two of the deviation.

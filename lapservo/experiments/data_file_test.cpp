@@ -8,7 +8,6 @@
 
 #include "lapservo/core/csv.h"
 #include "lapservo/core/error.h"
-#include "lapservo/experiments/time_series.h"
 #include "lapservo/testing/temporary_folder.h"
 
 namespace lapservo::internal {

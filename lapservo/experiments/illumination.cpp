@@ -9,7 +9,6 @@
 
 #include "lapservo/experiments/comparison.h"
 #include "lapservo/experiments/data_file.h"
-#include "lapservo/experiments/positions.h"
 #include "lapservo/experiments/stage.h"
 #include "lapservo/io/overlay.h"
 #include "lapservo/kinematics/centre_line.h"
@@ -83,12 +82,9 @@ cv::Mat example(const ExperimentSetup& setup, Stage& stage, const JointVector& q
 }
 
 Series by_position(const IlluminationResult::OfMethod& of_method) {
-  return series_of(
-      method_title(of_method.method), of_method.largest,
-      [](const IlluminationResult::Largest& largest) {
-        return PlotPoint({largest.position + 1, largest.px});
-      },
-      Draw::points, method_colour(of_method.method));
+  const auto point = [](const IlluminationResult::Largest& one) { return PlotPoint({one.position + 1, one.px}); };
+  return series_of(method_title(of_method.method), of_method.largest, point, Draw::points,
+                   method_colour(of_method.method));
 }
 
 Series by_light(const IlluminationResult::OfMethod& of_method) {
@@ -121,20 +117,13 @@ Plot plot_of_largest(const IlluminationResult& result) {
 }
 
 std::string percents() {
-  std::string text;
-  for (std::size_t i = 0; i < IlluminationResult::lights.size(); ++i)
-    text += fmt::format("{}{:.0f}",
-                        i == 0                                      ? ""
-                        : i + 1 < IlluminationResult::lights.size() ? ", "
-                                                                    : " and ",
-                        100 * IlluminationResult::lights[i]);
-  return text + " %";
+  const auto& lights = IlluminationResult::lights;
+  return fmt::format("{:.0f}, {:.0f}, {:.0f} and {:.0f} %", 100 * lights[0], 100 * lights[1], 100 * lights[2],
+                     100 * lights[3]);
 }
 
 std::vector<Comparison> comparisons_of(const IlluminationResult& result) {
-  const auto row = [&](const std::string& what, const std::string& paper, const auto& text_of) {
-    return compared(what, paper, result.methods, text_of);
-  };
+  const auto row = comparing(result.methods);
   const std::string points = fmt::format("{}", 4 * IlluminationResult::positions);
   const std::string measurements = fmt::format("{}", 4 * IlluminationResult::positions * light_count);
   return {row("largest distance of a point\u2019s four measurements to their centroid, mean \u00b1 std of " + points +

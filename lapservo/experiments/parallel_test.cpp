@@ -1,10 +1,10 @@
-#include "lapservo/experiments/parallel.h"
-
 #include <atomic>
 #include <stdexcept>
 #include <vector>
 
 #include <gtest/gtest.h>
+
+#include "lapservo/experiments/setup.h"
 
 namespace lapservo::internal {
 namespace {

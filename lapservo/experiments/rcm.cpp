@@ -8,7 +8,6 @@
 #include "lapservo/core/dense_matrix.h"
 #include "lapservo/experiments/comparison.h"
 #include "lapservo/experiments/data_file.h"
-#include "lapservo/experiments/positions.h"
 #include "lapservo/experiments/stage.h"
 #include "lapservo/kinematics/centre_line.h"
 #include "lapservo/rcm/pairwise_mean.h"
@@ -44,10 +43,6 @@ void estimate(RcmResult::OfMethod& of_method, const Eigen::Vector2d& true_px) {
   }
   of_method.pairwise = summed_up(std::move(pairwise));
   of_method.least_squares = summed_up(std::move(least_squares));
-}
-
-std::string estimator_name(bool pairwise) {
-  return pairwise ? "mean of intersections" : "total least squares";
 }
 
 std::vector<double> distances_of(const RcmResult::OfMethod& of_method, double min_angle_rad) {
@@ -128,7 +123,7 @@ Table by_estimator(const RcmResult& result) {
   for (const auto& of_method : result.methods)
     for (const bool pairwise : {true, false}) {
       const auto& of = pairwise ? of_method.pairwise : of_method.least_squares;
-      table.rows.push_back({method_title(of_method.method), estimator_name(pairwise),
+      table.rows.push_back({method_title(of_method.method), pairwise ? "mean of intersections" : "total least squares",
                             fmt::format("{:.3f}", of.distance.mean), fmt::format("{:.3f}", of.distance.deviation),
                             fmt::format("{:.3f}", of.distance.median), fmt::format("{:.3f}", of.distance.largest),
                             fmt::format("{:.2f}", of.in_sigmas),
@@ -138,9 +133,7 @@ Table by_estimator(const RcmResult& result) {
 }
 
 std::vector<Comparison> comparisons_of(const RcmResult& result) {
-  const auto row = [&](const std::string& what, const std::string& paper, const auto& text_of) {
-    return compared(what, paper, result.methods, text_of);
-  };
+  const auto row = comparing(result.methods);
   const auto quantile = [](double fraction) {
     return [fraction](const auto& m) { return with_digits(quantile_of(distances_of(m, 0), fraction), 3) + " px"; };
   };

@@ -8,7 +8,6 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/experiments/comparison.h"
 #include "lapservo/experiments/data_file.h"
-#include "lapservo/experiments/positions.h"
 #include "lapservo/experiments/stage.h"
 #include "lapservo/sim/tissue.h"
 
@@ -90,9 +89,7 @@ std::string from_to(double least, double most) {
 }
 
 std::string range_of(const RotationResult::OfMethod& of_method, double Spread::*figure) {
-  const auto [least, most] =
-      std::minmax_element(of_method.by_trial.begin(), of_method.by_trial.end(),
-                          [&](const Spread& a, const Spread& b) { return a.*figure < b.*figure; });
+  const auto [least, most] = std::ranges::minmax_element(of_method.by_trial, {}, figure);
   return from_to((*least).*figure, (*most).*figure);
 }
 
@@ -106,9 +103,7 @@ std::string percent(double fraction) {
 }
 
 std::vector<Comparison> comparisons_of(const RotationResult& result) {
-  const auto row = [&](const std::string& what, const std::string& paper, const auto& text_of) {
-    return compared(what, paper, result.methods, text_of);
-  };
+  const auto row = comparing(result.methods);
   const Pooled paper = pooled(RotationResult::paper_mean_rad, RotationResult::paper_deviation_rad);
   return {row("standard deviation of the error, from trial to trial", range_of(RotationResult::paper_deviation_rad),
               [](const auto& m) { return range_of(m, &Spread::deviation); }),

@@ -13,7 +13,6 @@
 #include "lapservo/control/random_start.h"
 #include "lapservo/control/tracking_law.h"
 #include "lapservo/core/error.h"
-#include "lapservo/experiments/positions.h"
 #include "lapservo/experiments/stage.h"
 #include "lapservo/rcm/projected_rcm.h"
 #include "lapservo/servo/convergence.h"
@@ -31,20 +30,14 @@ constexpr double period_s = tracking_period_s, window_margin_px = 20;
 
 std::vector<TrackingScenario> scenarios() {
   std::vector<TrackingScenario> all{
-      {"default", "the default", ControlMode::fused, Method::surface, 0.08, 20, {}, {}},
-      {"paper", "the paper\u2019s law and eyes", ControlMode::paper, Method::centerline, 0.08, 60, {}, {}},
-      {"paper_surface", "the paper\u2019s law, our eyes", ControlMode::paper, Method::surface, 0.08, 60, {}, {}},
-      {"uncalibrated", "uncalibrated", ControlMode::uncalibrated, Method::surface, 0.08, 20, {}, {}},
+      {"default", "the default", ControlMode::fused, Method::surface, 0.08, 20},
+      {"paper", "the paper\u2019s law and eyes", ControlMode::paper, Method::centerline, 0.08, 60},
+      {"paper_surface", "the paper\u2019s law, our eyes", ControlMode::paper, Method::surface, 0.08, 60},
+      {"uncalibrated", "uncalibrated", ControlMode::uncalibrated, Method::surface, 0.08, 20},
       {"hidden", "the marker hidden for 2 s", ControlMode::fused, Method::surface, 0.08, 13, 7, 9}};
   for (const int latency_ms : {0, 150, 250})
-    all.push_back({fmt::format("latency_{}", latency_ms),
-                   fmt::format("latency {} ms", latency_ms),
-                   ControlMode::fused,
-                   Method::surface,
-                   latency_ms / 1000.0,
-                   10,
-                   {},
-                   {}});
+    all.push_back({fmt::format("latency_{}", latency_ms), fmt::format("latency {} ms", latency_ms), ControlMode::fused,
+                   Method::surface, latency_ms / 1000.0, 10});
   return all;
 }
 
@@ -52,11 +45,9 @@ std::vector<TrackingScenario> scenarios() {
 Eigen::Vector2d estimate_rcm_px(const ExperimentSetup& setup) {
   constexpr int positions = 20;
   constexpr double nominal_sigma_px = 0.1;
-  Rig unregistered = setup.rig;
-  unregistered.instruments[0].camera_from_rcm.reset();
   Random random(setup.seed + 17);
   Stage stage(setup.rig, make_tissue(setup.rig.camera.width_px, setup.rig.camera.height_px, setup.seed + 17));
-  Eyes eyes(unregistered, {Method::surface});
+  Eyes eyes(without_registration(setup.rig), {Method::surface});
   std::vector<LineObservation> lines;
   int frame = 0;
   for (const JointVector& q : spread_positions(setup.rig, positions, random)) {
@@ -145,11 +136,6 @@ std::optional<double> decay_per_s(const TrackingRun& run, int feature) {
   return n >= fewest ? std::optional(-(n * ty - t * y) / (n * tt - t * t)) : std::nullopt;
 }
 
-// The last third; of the run with the hidden marker all that comes after the marker is back.
-double steady_from_s(const TrackingScenario& scenario) {
-  return scenario.hidden_to_s.value_or(2 * scenario.duration_s / 3);
-}
-
 void sum_up(TrackingRun& run) {
   const TimeTable& table = run.table;
   Convergence convergence, again;
@@ -157,7 +143,8 @@ void sum_up(TrackingRun& run) {
   for (std::size_t i = 0; i < table.time_s.size(); ++i) {
     const Eigen::Vector4d error = error_at(table, i);
     convergence.add(table.time_s[i], error);
-    if (table.time_s[i] < steady_from_s(run.scenario)) continue;
+    // The last third; of the run with the hidden marker all that comes after the marker is back.
+    if (table.time_s[i] < run.scenario.hidden_to_s.value_or(2 * run.scenario.duration_s / 3)) continue;
     again.add(table.time_s[i], error);
     run.steady_rms += error.cwiseAbs2();
     run.steady_mean += error;

@@ -9,8 +9,8 @@
 #include <Eigen/Core>
 
 #include "lapservo/control/controller_config.h"
+#include "lapservo/experiments/data_file.h"
 #include "lapservo/experiments/setup.h"
-#include "lapservo/experiments/time_series.h"
 #include "lapservo/report/html_report.h"
 #include "lapservo/sim/simulator.h"
 
@@ -24,7 +24,7 @@ struct TrackingScenario {
   Method method = Method::surface;
   double latency_s = 0.08;
   double duration_s = 20;
-  std::optional<double> hidden_from_s, hidden_to_s;  ///< the marker is covered then
+  std::optional<double> hidden_from_s = {}, hidden_to_s = {};  ///< the marker is covered then
 };
 
 struct TrackingRun {

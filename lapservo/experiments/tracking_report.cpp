@@ -24,8 +24,7 @@ constexpr std::array features{FeatureName{"s", "s_rad", "mrad", 1000}, FeatureNa
 
 // Null when it was stopped before its end.
 const TrackingRun* run_of(const TrackingResult& result, const std::string& id) {
-  const auto run = std::find_if(result.runs.begin(), result.runs.end(),
-                                [&](const TrackingRun& candidate) { return candidate.scenario.id == id; });
+  const auto run = std::ranges::find(result.runs, id, [](const TrackingRun& one) { return one.scenario.id; });
   return run == result.runs.end() ? nullptr : &*run;
 }
 

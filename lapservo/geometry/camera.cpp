@@ -1,7 +1,5 @@
 #include "lapservo/geometry/camera.h"
 
-#include <cmath>
-
 #include <Eigen/LU>
 
 namespace lapservo {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
-#include <cstring>
+#include <initializer_list>
 #include <string_view>
 
 #include <opencv2/imgproc.hpp>
@@ -29,10 +29,6 @@ namespace fs = std::filesystem;
 
 constexpr std::uint32_t max_side_px = 16384;
 constexpr std::size_t max_bytes = std::size_t{256} << 20;
-
-bool starts_with(std::span<const std::uint8_t> bytes, std::string_view magic) {
-  return bytes.size() >= magic.size() && std::memcmp(bytes.data(), magic.data(), magic.size()) == 0;
-}
 
 struct PictureSize {
   std::uint32_t width_px = 0, height_px = 0;
@@ -68,7 +64,7 @@ void check_size(const PictureSize& size, const std::string& source) {
 }
 
 bool is_png(std::span<const std::uint8_t> bytes) {
-  return starts_with(bytes, std::string_view("\x89PNG\r\n\x1a\n", 8));
+  return text_of(bytes).starts_with("\x89PNG\r\n\x1a\n");
 }
 
 // The bytes that the file says it has.
@@ -105,12 +101,6 @@ std::string unread_format(std::span<const std::uint8_t> bytes) {
   return std::find(heic.begin(), heic.end(), brand) != heic.end() ? "HEIC" : "";
 }
 
-void refuse_several(std::span<const std::uint8_t> bytes, const std::string& source) {
-  if (const std::size_t count = picture_count(bytes); count > 1)
-    throw InputError(source,
-                     "holds " + std::to_string(count) + " images, expected one: write them into a folder, one a file");
-}
-
 void refuse_unread(std::span<const std::uint8_t> bytes, const std::string& source) {
   if (const std::string format = unread_format(bytes); !format.empty())
     throw InputError(source, "is in " + format + ", which is not read: convert it to PNG");
@@ -118,33 +108,26 @@ void refuse_unread(std::span<const std::uint8_t> bytes, const std::string& sourc
     throw InputError(source, "is a JPEG in CMYK, which is not read: convert it to PNG in RGB");
 }
 
-DecodedPicture decode(std::span<const std::uint8_t> bytes) {
-  if (is_png(bytes)) return decode_png(bytes);
-  if (is_jpeg(bytes)) return decode_jpeg(bytes);
-  return {libav_decode(bytes), ""};
+bool has_extension(const fs::path& path, std::initializer_list<std::string_view> known) {
+  return std::find(known.begin(), known.end(), lower_case(path.extension().string())) != known.end();
 }
 
 }  // namespace
 
 bool has_image_extension(const fs::path& path) {
-  static constexpr std::array<std::string_view, 7> known{".png", ".jpg", ".jpeg", ".bmp", ".webp", ".ppm", ".pgm"};
-  const std::string extension = lower_case(path.extension().string());
-  return std::find(known.begin(), known.end(), extension) != known.end();
+  return has_extension(path, {".png", ".jpg", ".jpeg", ".bmp", ".webp", ".ppm", ".pgm"});
 }
 
 bool has_jpeg_extension(const fs::path& path) {
-  const std::string extension = lower_case(path.extension().string());
-  return extension == ".jpg" || extension == ".jpeg";
+  return has_extension(path, {".jpg", ".jpeg"});
 }
 
 bool is_written(const fs::path& path) {
-  return has_jpeg_extension(path) || lower_case(path.extension().string()) == ".png";
+  return has_jpeg_extension(path) || has_extension(path, {".png"});
 }
 
 bool has_unread_extension(const fs::path& path) {
-  const std::string extension = lower_case(path.extension().string());
-  static constexpr std::array<std::string_view, 7> known{".heic", ".heif", ".avif", ".dcm", ".dicom", ".tif", ".tiff"};
-  return std::find(known.begin(), known.end(), extension) != known.end();
+  return has_extension(path, {".heic", ".heif", ".avif", ".dcm", ".dicom", ".tif", ".tiff"});
 }
 
 cv::Mat bgr8_from(const cv::Mat& image, const std::string& source) {
@@ -172,13 +155,17 @@ cv::Mat bgr8_from(const cv::Mat& image, const std::string& source) {
 Picture decode_picture(std::span<const std::uint8_t> bytes, const std::string& source) {
   if (bytes.empty()) throw InputError(source, "is empty, expected an image");
   check_whole(bytes, source);
-  refuse_several(bytes, source);
+  if (const std::size_t count = picture_count(bytes); count > 1)
+    throw InputError(source,
+                     "holds " + std::to_string(count) + " images, expected one: write them into a folder, one a file");
   refuse_unread(bytes, source);
   // 0 and numbers above 8 have no meaning in EXIF; they are shown upright everywhere.
   if (const auto orientation = exif_orientation(bytes); orientation && *orientation >= 2 && *orientation <= 8)
     throw InputError(source, "EXIF orientation", std::to_string(*orientation),
                      "1: the pixels as the calibrated camera has them, not to be turned");
-  DecodedPicture decoded = decode(bytes);
+  const DecodedPicture decoded = is_png(bytes)    ? decode_png(bytes)
+                                 : is_jpeg(bytes) ? decode_jpeg(bytes)
+                                                  : DecodedPicture{libav_decode(bytes), ""};
   if (is_jpeg(bytes) && !decoded.complaint.empty() && text_of(bytes).rfind("\xff\xd9") == std::string_view::npos)
     throw InputError(source, "is a truncated JPEG, expected a whole image");
   if (decoded.bgr.empty())

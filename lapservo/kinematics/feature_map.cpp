@@ -15,18 +15,11 @@ constexpr double min_px = 1e-6;  // lengths below it give no direction
 
 using PerJoint = Eigen::Matrix<double, 2, 4>;  // of an image point, by q
 
-struct FacingAzimuth {
-  double d_theta, d_phi;
-};
-
-// How the facing azimuth turns with the shaft. The RCM is the fixed point of both rotations, so the camera centre,
-// seen from it in unrolled axes, is w = -U^T t, and turns against the rotation axis: dw = -axis x w.
-FacingAzimuth facing_azimuth_rates(const Eigen::Vector3d& w, const Eigen::Vector3d& theta_axis) {
-  const auto rate = [&](const Eigen::Vector3d& axis) {
-    const Eigen::Vector3d dw = -axis.cross(w);
-    return (w.x() * dw.y() - w.y() * dw.x()) / w.head<2>().squaredNorm();
-  };
-  return {rate(theta_axis), rate(Eigen::Vector3d::UnitY())};
+// How the facing azimuth turns with the shaft about an axis. The RCM is the fixed point of the rotation, so the camera
+// centre, seen from it in unrolled axes, is w = -U^T t, and turns against the axis: dw = -axis x w.
+double facing_azimuth_rate(const Eigen::Vector3d& w, const Eigen::Vector3d& axis) {
+  const Eigen::Vector3d dw = -axis.cross(w);
+  return (w.x() * dw.y() - w.y() * dw.x()) / w.head<2>().squaredNorm();
 }
 
 // d(e_k)/dq for k = 0..3.
@@ -36,8 +29,8 @@ std::array<PerJoint, 4> edge_rates(const ImageModel& model, const JointVector& q
   const Eigen::Vector3d along = Eigen::Vector3d::UnitZ();
   const double gamma = line.facing_azimuth_rad;
   const Eigen::Vector3d around = model.marker.radius_m() * Eigen::Vector3d(-std::sin(gamma), std::cos(gamma), 0);
-  const FacingAzimuth turn =
-      facing_azimuth_rates(-(camera_from_unrolled.conjugate() * model.camera_from_rcm.translation), theta_axis);
+  const Eigen::Vector3d w = -(camera_from_unrolled.conjugate() * model.camera_from_rcm.translation);
+  const double d_theta = facing_azimuth_rate(w, theta_axis), d_phi = facing_azimuth_rate(w, Eigen::Vector3d::UnitY());
   const auto along_m = boundaries_m(model.marker, line.tau_rad);
   const auto slopes_m = boundary_slopes_m(model.marker);
 
@@ -46,8 +39,8 @@ std::array<PerJoint, 4> edge_rates(const ImageModel& model, const JointVector& q
     const Eigen::Vector3d arm = surface_point(model.marker.radius_m(), gamma, q.rho_m + along_m[k]);
     const Eigen::Vector3d by_gamma = around + slopes_m[k] * along;  // tau turns with gamma, and moves the boundary
     Eigen::Matrix<double, 3, 4> in_unrolled;
-    in_unrolled.col(0) = theta_axis.cross(arm) + turn.d_theta * by_gamma;
-    in_unrolled.col(1) = Eigen::Vector3d::UnitY().cross(arm) + turn.d_phi * by_gamma;
+    in_unrolled.col(0) = theta_axis.cross(arm) + d_theta * by_gamma;
+    in_unrolled.col(1) = Eigen::Vector3d::UnitY().cross(arm) + d_phi * by_gamma;
     in_unrolled.col(2) = along;
     in_unrolled.col(3) = -slopes_m[k] * along;
     rates[k] = model.camera.ideal_with_jacobian(line.points_in_camera_m[k]).d_px_d_point *
@@ -60,11 +53,6 @@ Eigen::RowVector4d length_rate(const Eigen::Vector2d& from_to, const PerJoint& r
   return from_to.normalized().transpose() * rate;
 }
 
-Undefined why_no_centre_line(const Marker& marker, const Rigid3& camera_from_unrolled) {
-  return view_cylinder(camera_from_unrolled, marker.radius_m()) ? Undefined::behind_camera
-                                                                : Undefined::camera_inside_shaft;
-}
-
 }  // namespace
 
 FeatureMapResult feature_map(const ImageModel& model, const JointVector& q) {
@@ -73,7 +61,8 @@ FeatureMapResult feature_map(const ImageModel& model, const JointVector& q) {
   if (!rcm_px) return {Undefined::rcm_in_focal_plane, {}};
   const Rigid3 camera_from_unrolled = model.camera_from_rcm * rcm_from_unrolled(q);
   const auto line = centre_line(model.camera, model.marker, camera_from_unrolled, q.psi_rad);
-  if (!line) return {why_no_centre_line(model.marker, camera_from_unrolled), {}};
+  if (!line && view_cylinder(camera_from_unrolled, model.marker.radius_m())) return {Undefined::behind_camera, {}};
+  if (!line) return {Undefined::camera_inside_shaft, {}};
 
   const auto& e = line->ideal_px;
   const Eigen::Vector2d from_rcm = e[0] - *rcm_px, whole = e[3] - e[0], inner = e[2] - e[0];

@@ -51,10 +51,9 @@ double lowest_of_quadratic_on_unit_interval(const std::array<double, 3>& c, doub
 std::string decoding_problem(const Marker& marker) {
   const Lengths l = lengths(marker);
   const auto c = derivative_numerator(l);
-  const double sign = cross_ratio(l.upper[0] + l.slope[0], l.upper[1] + l.slope[1], l.upper[2] + l.slope[2]) >
-                              cross_ratio(l.upper[0], l.upper[1], l.upper[2])
-                          ? 1
-                          : -1;
+  const double begin = cross_ratio(l.upper[0], l.upper[1], l.upper[2]);
+  const double end = cross_ratio(l.upper[0] + l.slope[0], l.upper[1] + l.slope[1], l.upper[2] + l.slope[2]);
+  const double sign = end > begin ? 1 : -1;
   // Relative to the size of the terms: a slope that vanishes in rounding is no slope.
   const double scale = std::abs(c[0]) + std::abs(c[1]) + std::abs(c[2]);
   const double length_cubed = l.total * l.total * l.total;

@@ -39,8 +39,7 @@ Marker marker_of(const DesignSpec& spec, double length_m, const Choice& choice) 
 }
 
 double min_band(const Marker& marker) {
-  return std::min(*std::min_element(marker.bands_upper_m.begin(), marker.bands_upper_m.end()),
-                  *std::min_element(marker.bands_lower_m.begin(), marker.bands_lower_m.end()));
+  return std::min(std::ranges::min(marker.bands_upper_m), std::ranges::min(marker.bands_lower_m));
 }
 
 std::string millimetres(double length_m) {

@@ -264,8 +264,7 @@ std::string text_of(const Fault& fault) {
   if (fault.which == 1)
     return fmt::format(
         "the lines bend as by a lens, by {:.2g} px at the border of the observed points: undistort them by a "
-        "calibration of "
-        "this camera",
+        "calibration of this camera",
         px);
   return fmt::format(
       "the lines pass the RCM on one side, one end of all of them is {:.2g} px beside the shaft's axis: light the "

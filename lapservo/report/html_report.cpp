@@ -207,8 +207,7 @@ std::vector<std::string> papers_pictures(const ReportSection& section) {
 // Every figure of the paper's, section by section; nothing where none is compared.
 std::string summary(const Report& report) {
   std::string rows, links;
-  if (std::all_of(report.sections.begin(), report.sections.end(),
-                  [](const ReportSection& section) { return section.comparisons.empty(); }))
+  if (std::ranges::all_of(report.sections, [](const ReportSection& section) { return section.comparisons.empty(); }))
     return {};
   for (const ReportSection& section : report.sections) {
     rows += fmt::format("<tr class=\"part\"><td colspan=\"4\"><a href=\"#{}\">{}</a></td></tr>\n", escaped(section.id),

@@ -61,19 +61,13 @@ Range padded(Range range, const Axis& axis) {
   return {axis.low.value_or(range.low), axis.high.value_or(range.high)};
 }
 
-Range x_range(const Plot& plot) {
+Range range_of(const Plot& plot, const Axis& axis, std::vector<double> Series::*values,
+               const std::vector<ReferenceLine>& references) {
   Range range{HUGE_VAL, -HUGE_VAL};
   for (const Series& series : plot.series)
-    for (const double x : series.x) extend(range, x, plot.x.logarithmic);
-  return padded(range, plot.x);
-}
-
-Range y_range(const Plot& plot) {
-  Range range{HUGE_VAL, -HUGE_VAL};
-  for (const Series& series : plot.series)
-    for (const double y : series.y) extend(range, y, plot.y.logarithmic);
-  for (const ReferenceLine& line : plot.references) extend(range, line.y, plot.y.logarithmic);
-  return padded(range, plot.y);
+    for (const double value : series.*values) extend(range, value, axis.logarithmic);
+  for (const ReferenceLine& line : references) extend(range, line.y, axis.logarithmic);
+  return padded(range, axis);
 }
 
 std::vector<double> ticks_of(const Scale& scale, int most) {
@@ -264,8 +258,8 @@ void make_isotropic(Layout& layout) {
 Layout layout_of(const Plot& plot, double top_px, double bottom_edge_px) {
   Layout layout{0,
                 top_px,
-                {x_range(plot), plot.x.logarithmic, 0, width_px - right_px},
-                {y_range(plot), plot.y.logarithmic, bottom_edge_px, top_px}};
+                {range_of(plot, plot.x, &Series::x, {}), plot.x.logarithmic, 0, width_px - right_px},
+                {range_of(plot, plot.y, &Series::y, plot.references), plot.y.logarithmic, bottom_edge_px, top_px}};
   if (plot.image_plane) std::swap(layout.y.at_low_px, layout.y.at_high_px);
   const auto place_left = [&layout] {
     std::size_t widest = 1;

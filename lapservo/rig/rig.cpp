@@ -8,7 +8,6 @@
 #include <optional>
 #include <sstream>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -20,10 +19,9 @@
 #include "lapservo/marker/decoder.h"
 #include "lapservo/rig/camera_formats.h"
 #include "lapservo/rig/check_rig.h"
-#include "lapservo/rig/covariance_field.h"
+#include "lapservo/rig/matrix_field.h"
 #include "lapservo/rig/response_field.h"
 #include "lapservo/rig/tool_field.h"
-#include "lapservo/rig/unit_quaternion.h"
 
 namespace lapservo {
 using namespace internal;
@@ -49,13 +47,6 @@ int parse_image_size(const YamlField& field) {
   const double value = field.number_between(16, 16384, expected);
   if (value != std::floor(value)) field.fail(field.value_text(), expected);
   return static_cast<int>(value);
-}
-
-// A marker where pixels have no ray would be seen and not understood.
-void check_invertible(const Camera& camera, const YamlField& coefficients) {
-  if (!is_invertible(camera))
-    coefficients.fail("not invertible within the largest circle amid the image",
-                      "k1 k2 p1 p2 k3 of a calibration that covers it");
 }
 
 // A ROS matrix: rows and cols say how the numbers of data lie.
@@ -161,7 +152,10 @@ Camera parse_camera_fields(const YamlField& field) {
   camera.fx_px = k[0], camera.cx_px = k[2], camera.fy_px = k[4], camera.cy_px = k[5];
   if (const YamlField coefficients = field["distortion_coefficients"]; coefficients.present()) {
     camera.distortion = parse_distortion(coefficients);
-    check_invertible(camera, coefficients["data"]);
+    // A marker where pixels have no ray would be seen and not understood.
+    if (!is_invertible(camera))
+      coefficients["data"].fail("not invertible within the largest circle amid the image",
+                                "k1 k2 p1 p2 k3 of a calibration that covers it");
   }
   camera.response = parse_response(field["response"]);
   camera.response.sigma = sigma_in(field, "sigma_response");

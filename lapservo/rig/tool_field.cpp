@@ -1,7 +1,6 @@
 #include "lapservo/rig/tool_field.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <string>
 #include <vector>
@@ -9,8 +8,7 @@
 #include <fmt/format.h>
 
 #include "lapservo/core/known_keys.h"
-#include "lapservo/rig/covariance_field.h"
-#include "lapservo/rig/unit_quaternion.h"
+#include "lapservo/rig/matrix_field.h"
 #include "lapservo/tool/dvrk_tool_file.h"
 
 namespace lapservo::internal {

@@ -36,18 +36,124 @@ std::vector<cv::Rect> without_overlap(std::vector<cv::Rect> parts) {
 
 class Renderer::State {
  public:
-  State(const Camera& camera, std::vector<ShaftModel> shafts, const cv::Mat& background, RenderOptions options);
-  cv::Mat render_exposure(const Exposure& exposure, std::uint64_t seed);
-  void set_gains(const Light& gains);
+  State(const Camera& camera, std::vector<ShaftModel> shafts, const cv::Mat& background, RenderOptions options)
+      : camera_(camera),
+        half_field_rad_(half_field_rad(camera)),
+        shafts_(std::move(shafts)),
+        options_(options),
+        optics_(options.sensor.blur_px),
+        encoder_(camera.response, options.sensor),
+        rays_(camera) {
+    CV_Assert(background.type() == CV_32FC3 && background.cols == camera.width_px &&
+              background.rows == camera.height_px);
+    background_light_ = background.clone();
+    scene_.light = background.clone();
+    const bool has_tools =
+        std::any_of(shafts_.begin(), shafts_.end(), [](const ShaftModel& shaft) { return shaft.tool.has_value(); });
+    if (shafts_.size() > 1 || has_tools) {
+      scene_.depth_m = cv::Mat(background.size(), CV_32F, cv::Scalar(far_m));
+      scene_.cover = cv::Mat(background.size(), CV_32F, cv::Scalar(0));
+    }
+    develop_background();
+  }
+
+  cv::Mat render_exposure(const Exposure& exposure, std::uint64_t seed) {
+    std::vector<cv::Rect> drawn;
+    if (exposure.size() == 1) {
+      drawn = draw(exposure.front());
+      for (const cv::Rect& part : drawn) develop(scene_.light, part, frame_);
+      clear(drawn);
+    } else {
+      cv::Mat exposed = background_light_.clone();
+      const double fraction = 1.0 / static_cast<double>(exposure.size());
+      for (const auto& moment : exposure) {
+        const std::vector<cv::Rect> now = draw(moment);
+        for (const cv::Rect& part : now) exposed(part) += (scene_.light(part) - background_light_(part)) * fraction;
+        clear(now);
+        drawn.insert(drawn.end(), now.begin(), now.end());
+      }
+      drawn = without_overlap(std::move(drawn));
+      for (const cv::Rect& part : drawn) develop(exposed, part, frame_);
+    }
+    const cv::Mat image = encoder_.expose(frame_, seed);
+    for (const cv::Rect& part : drawn) {
+      background_.value(part).copyTo(frame_.value(part));
+      background_.sigma(part).copyTo(frame_.sigma(part));
+    }
+    return image;
+  }
+
+  void set_gains(const Light& gains) {
+    if (gains == options_.sensor.gains) return;
+    options_.sensor.gains = gains;
+    encoder_.set_gains(gains);
+    develop_background();
+  }
+
   std::unique_ptr<State> clone() const {
     return std::make_unique<State>(camera_, shafts_, background_light_, options_);
   }
 
  private:
-  void develop_background();
-  std::vector<cv::Rect> draw(const std::vector<ShaftPlacement>& placements);
-  void clear(const std::vector<cv::Rect>& drawn);
-  void develop(const cv::Mat& light, const cv::Rect& part, SensorEncoder::Encoded& encoded);
+  void develop_background() {
+    background_ = encoder_.allocate(background_light_.size());
+    develop(background_light_, cv::Rect({0, 0}, background_light_.size()), background_);
+    frame_ = {background_.value.clone(), background_.sigma.clone()};
+  }
+
+  std::vector<cv::Rect> draw(const std::vector<ShaftPlacement>& placements) {
+    std::vector<cv::Rect> drawn;
+    const double margin_px = optics_.reach_px() + 1;
+    const auto paint = [&](const std::vector<Span>& bands, auto& painter) {
+      for (std::size_t b = 0; b < bands.size(); ++b) {
+        if (bands[b].empty()) continue;
+        const int top = static_cast<int>(b) * band_rows;
+        const cv::Rect part(bands[b].begin, top, bands[b].end - bands[b].begin,
+                            std::min(band_rows, camera_.height_px - top));
+        painter.paint(rays_, part, background_light_, scene_);
+        drawn.push_back(part);
+      }
+    };
+    for (std::size_t i = 0; i < placements.size(); ++i) {
+      const ShaftModel& shaft = shafts_.at(i);
+      const Eigen::Vector3d tip =
+          placements[i].camera_from_unrolled * Eigen::Vector3d(0, 0, shaft.marker.length_m() + shaft.shaft_beyond_m);
+      ShaftPainter painter(shaft, placements[i], options_.lighting,
+                           disc_around_ball(camera_, half_field_rad_, tip, shaft.tip_radius_m()));
+      paint(outline(camera_, half_field_rad_, shaft, placements[i], margin_px), painter);
+      const std::vector<Capsule> links = tool_links(shaft, placements[i]);
+      if (links.empty()) continue;
+      std::vector<Span> bands = no_bands(camera_);
+      for (const Capsule& link : links)
+        widen_along(bands, camera_, half_field_rad_, link.from_m, link.to_m, link.radius_m, margin_px);
+      ToolPainter tool(links, options_.lighting);
+      paint(bands, tool);
+    }
+    return without_overlap(std::move(drawn));
+  }
+
+  void clear(const std::vector<cv::Rect>& drawn) {
+    for (const cv::Rect& part : drawn) {
+      background_light_(part).copyTo(scene_.light(part));
+      if (scene_.cover.empty()) continue;
+      scene_.depth_m(part).setTo(far_m);
+      scene_.cover(part).setTo(0);
+    }
+  }
+
+  // Blurs, veils and encodes a part. A veil is even: it may come after the blur.
+  void develop(const cv::Mat& light, const cv::Rect& part, SensorEncoder::Encoded& encoded) {
+    const float clear = 1 - options_.smoke, veil = smoke_light * options_.smoke;
+    veiled_.resize(static_cast<std::size_t>(3 * part.width));
+    for (int v = part.y; v < part.y + part.height; ++v) {
+      const float* row = optics_.row(light, v, part.x, part.x + part.width);
+      if (options_.smoke > 0) {
+        for (std::size_t i = 0; i < veiled_.size(); ++i) veiled_[i] = clear * row[i] + veil;
+        row = veiled_.data();
+      }
+      encoder_.encode(row, part.width, v, part.x, encoded);
+    }
+  }
 
   Camera camera_;
   double half_field_rad_;
@@ -61,120 +167,6 @@ class Renderer::State {
   SensorEncoder::Encoded background_, frame_;  // blurred and encoded
   std::vector<float> veiled_;
 };
-
-Renderer::State::State(const Camera& camera, std::vector<ShaftModel> shafts, const cv::Mat& background,
-                       RenderOptions options)
-    : camera_(camera),
-      half_field_rad_(half_field_rad(camera)),
-      shafts_(std::move(shafts)),
-      options_(options),
-      optics_(options.sensor.blur_px),
-      encoder_(camera.response, options.sensor),
-      rays_(camera) {
-  CV_Assert(background.type() == CV_32FC3 && background.cols == camera.width_px && background.rows == camera.height_px);
-  background_light_ = background.clone();
-  scene_.light = background.clone();
-  const bool has_tools =
-      std::any_of(shafts_.begin(), shafts_.end(), [](const ShaftModel& shaft) { return shaft.tool.has_value(); });
-  if (shafts_.size() > 1 || has_tools) {
-    scene_.depth_m = cv::Mat(background.size(), CV_32F, cv::Scalar(far_m));
-    scene_.cover = cv::Mat(background.size(), CV_32F, cv::Scalar(0));
-  }
-  develop_background();
-}
-
-void Renderer::State::develop_background() {
-  background_ = encoder_.allocate(background_light_.size());
-  develop(background_light_, cv::Rect({0, 0}, background_light_.size()), background_);
-  frame_ = {background_.value.clone(), background_.sigma.clone()};
-}
-
-void Renderer::State::set_gains(const Light& gains) {
-  if (gains == options_.sensor.gains) return;
-  options_.sensor.gains = gains;
-  encoder_.set_gains(gains);
-  develop_background();
-}
-
-// Blurs, veils and encodes a part. A veil is even: it may come after the blur.
-void Renderer::State::develop(const cv::Mat& light, const cv::Rect& part, SensorEncoder::Encoded& encoded) {
-  const float clear = 1 - options_.smoke, veil = smoke_light * options_.smoke;
-  veiled_.resize(static_cast<std::size_t>(3 * part.width));
-  for (int v = part.y; v < part.y + part.height; ++v) {
-    const float* row = optics_.row(light, v, part.x, part.x + part.width);
-    if (options_.smoke > 0) {
-      for (std::size_t i = 0; i < veiled_.size(); ++i) veiled_[i] = clear * row[i] + veil;
-      row = veiled_.data();
-    }
-    encoder_.encode(row, part.width, v, part.x, encoded);
-  }
-}
-
-std::vector<cv::Rect> Renderer::State::draw(const std::vector<ShaftPlacement>& placements) {
-  std::vector<cv::Rect> drawn;
-  const double margin_px = optics_.reach_px() + 1;
-  const auto paint = [&](const std::vector<Span>& bands, auto& painter) {
-    for (std::size_t b = 0; b < bands.size(); ++b) {
-      if (bands[b].empty()) continue;
-      const int top = static_cast<int>(b) * band_rows;
-      const cv::Rect part(bands[b].begin, top, bands[b].end - bands[b].begin,
-                          std::min(band_rows, camera_.height_px - top));
-      painter.paint(rays_, part, background_light_, scene_);
-      drawn.push_back(part);
-    }
-  };
-  for (std::size_t i = 0; i < placements.size(); ++i) {
-    const ShaftModel& shaft = shafts_.at(i);
-    const Eigen::Vector3d tip =
-        placements[i].camera_from_unrolled * Eigen::Vector3d(0, 0, shaft.marker.length_m() + shaft.shaft_beyond_m);
-    ShaftPainter painter(shaft, placements[i], options_.lighting,
-                         disc_around_ball(camera_, half_field_rad_, tip, shaft.tip_radius_m()));
-    paint(outline(camera_, half_field_rad_, shaft, placements[i], margin_px), painter);
-    const std::vector<Capsule> links = tool_links(shaft, placements[i]);
-    if (links.empty()) continue;
-    std::vector<Span> bands = no_bands(camera_);
-    for (const Capsule& link : links)
-      widen_along(bands, camera_, half_field_rad_, link.from_m, link.to_m, link.radius_m, margin_px);
-    ToolPainter tool(links, options_.lighting);
-    paint(bands, tool);
-  }
-  return without_overlap(std::move(drawn));
-}
-
-void Renderer::State::clear(const std::vector<cv::Rect>& drawn) {
-  for (const cv::Rect& part : drawn) {
-    background_light_(part).copyTo(scene_.light(part));
-    if (scene_.cover.empty()) continue;
-    scene_.depth_m(part).setTo(far_m);
-    scene_.cover(part).setTo(0);
-  }
-}
-
-cv::Mat Renderer::State::render_exposure(const Exposure& exposure, std::uint64_t seed) {
-  std::vector<cv::Rect> drawn;
-  if (exposure.size() == 1) {
-    drawn = draw(exposure.front());
-    for (const cv::Rect& part : drawn) develop(scene_.light, part, frame_);
-    clear(drawn);
-  } else {
-    cv::Mat exposed = background_light_.clone();
-    const double fraction = 1.0 / static_cast<double>(exposure.size());
-    for (const auto& moment : exposure) {
-      const std::vector<cv::Rect> now = draw(moment);
-      for (const cv::Rect& part : now) exposed(part) += (scene_.light(part) - background_light_(part)) * fraction;
-      clear(now);
-      drawn.insert(drawn.end(), now.begin(), now.end());
-    }
-    drawn = without_overlap(std::move(drawn));
-    for (const cv::Rect& part : drawn) develop(exposed, part, frame_);
-  }
-  const cv::Mat image = encoder_.expose(frame_, seed);
-  for (const cv::Rect& part : drawn) {
-    background_.value(part).copyTo(frame_.value(part));
-    background_.sigma(part).copyTo(frame_.sigma(part));
-  }
-  return image;
-}
 
 Renderer::Renderer(const Camera& camera, std::vector<ShaftModel> shafts, const cv::Mat& background,
                    RenderOptions options)

@@ -1,7 +1,6 @@
 #include "apps/lapservo/cli/command.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <cstdio>
 #include <limits>

@@ -18,7 +18,6 @@
 #include "lapservo/core/error.h"
 #include "lapservo/core/rounded_sigma.h"
 #include "lapservo/report/html_report.h"
-#include "lapservo/rig/rig_writer.h"
 
 namespace lapservo::app {
 using namespace internal;
@@ -45,12 +44,8 @@ Plot joint_plot(const Alignment& found, const Joints& joints, std::size_t joint)
   const double unit = is_length ? 1e3 : 1;
   const auto pairs = some_of(found.pairs, enough);
   const auto curve = [&](const char* name, std::array<double, 4> Alignment::Pair::*of, Draw draw, int colour) {
-    return series_of(
-        name, pairs,
-        [&](const Alignment::Pair& pair) {
-          return PlotPoint(std::pair{pair.time_s, unit * (pair.*of)[joint]});
-        },
-        draw, colour);
+    const auto point = [&](const Alignment::Pair& pair) { return PlotPoint({pair.time_s, unit * (pair.*of)[joint]}); };
+    return series_of(name, pairs, point, draw, colour);
   };
   return time_plot(joints.names[joint], joints.names[joint], is_length ? "mm" : "rad",
                    {curve("joints, at the offset", &Alignment::Pair::read, Draw::line, 0),
@@ -58,16 +53,11 @@ Plot joint_plot(const Alignment& found, const Joints& joints, std::size_t joint)
 }
 
 void write_page(const std::string& path, const std::string& input, const Alignment& found, const Joints& joints) {
-  ReportSection section;
-  section.id = "align";
-  section.title = input;
+  ReportSection section{"align", input};
   section.text = {offset_text(found), drift_text(found)};
   for (std::size_t joint = 0; joint < 4; ++joint)
     section.figures.push_back({joint_plot(found, joints, joint), "Over the frames' stamps."});
-  Report report;
-  report.title = "lapservo align";
-  report.sections = {section};
-  write_report(path, report);
+  write_report(path, {"lapservo align", {}, {section}});
   std::printf("report: %s\n", path.c_str());
 }
 
@@ -103,10 +93,7 @@ int run(const CalibrateOptions& options) {
   }
   rig.instruments[index].image_delay_s = found.delay_s;
   rig.instruments[index].sigma_image_delay_s = rounded_sigma(found.sigma_delay_s);
-  out->stream() << rig_yaml(rig, options.out);
-  out->commit();
-  std::printf("rig: %s\n", options.out.c_str());
-  return 0;
+  return write_rig(*out, rig, options.out);
 }
 
 }  // namespace

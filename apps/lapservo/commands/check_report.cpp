@@ -268,10 +268,8 @@ std::string region_of(const CheckedRig& checked) {
 }
 
 void write_check_report(const std::filesystem::path& path, const std::string& instrument, const CheckedRig& checked) {
-  ReportSection section;
-  section.id = "check";
-  section.title = instrument + ": " + verdict_of(checked);
-  section.verdict = checked.good_enough() ? Verdict::good : Verdict::bad;
+  ReportSection section{"check", instrument + ": " + verdict_of(checked),
+                        checked.good_enough() ? Verdict::good : Verdict::bad};
   section.text.push_back(region_of(checked));
   int rank = 0;
   for (const Advice& advice : checked.advice)
@@ -286,10 +284,7 @@ void write_check_report(const std::filesystem::path& path, const std::string& in
       "Each of focal length, drift, delay and registration is what is left of it with the others taken out.",
       "Sigmas over the work space are those of rendered frames, times what the recording's own have over "
       "renderings of the same poses."};
-  Report report;
-  report.title = "lapservo check";
-  report.sections = {section};
-  write_report(path, report);
+  write_report(path, {"lapservo check", {}, {section}});
 }
 
 }  // namespace lapservo::app

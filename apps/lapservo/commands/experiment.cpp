@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -45,24 +46,14 @@ ReportSection run_experiment(const ExperimentSetup& setup, const fs::path& folde
   return section_of(result, setup);
 }
 
-struct Named {
-  std::string name;
-  Experiment experiment;
-};
-const std::vector<Named>& experiments() {
-  static const std::vector<Named> all{
+const std::vector<std::pair<std::string, Experiment>>& experiments() {
+  static const std::vector<std::pair<std::string, Experiment>> all{
       {"illumination", run_experiment<measure_illumination>},
       {"rcm", run_experiment<measure_rcm>},
       {"rotation", run_experiment<measure_rotation>},
       {"tracking", run_experiment<measure_tracking>},
   };
   return all;
-}
-
-std::string names() {
-  std::string text;
-  for (const Named& named : experiments()) text += named.name + ", ";
-  return text + "all";
 }
 
 ExperimentSetup setup_of(const ExperimentOptions& options) {
@@ -98,12 +89,6 @@ Report report_of(std::vector<ReportSection> sections, const std::string& missing
           missing};
 }
 
-// The library knows the rig, but not its file.
-[[noreturn]] void rethrow_with_rig(const InputError& error, const ExperimentOptions& options) {
-  if (error.source() == "rig" && !options.rig.empty()) throw error.with_source(options.rig);
-  throw error;
-}
-
 void print(const ReportSection& section) {
   std::printf("%s\n", section.title.c_str());
   for (const Comparison& c : with_paper(section)) {
@@ -114,13 +99,11 @@ void print(const ReportSection& section) {
   }
 }
 
-struct Outcome {
+// Their sections, and the name of the first experiment that has none, as it was stopped.
+std::pair<std::vector<ReportSection>, std::string> run_experiments(ExperimentSetup setup,
+                                                                   const ExperimentOptions& options,
+                                                                   const fs::path& folder) {
   std::vector<ReportSection> sections;
-  std::string stopped_in;  // the first experiment that has no section
-};
-
-Outcome run_experiments(ExperimentSetup setup, const ExperimentOptions& options, const fs::path& folder) {
-  Outcome outcome;
   for (const auto& [name, experiment] : experiments()) {
     if (options.name != "all" && options.name != name) continue;
     std::optional<Progress> progress;
@@ -131,15 +114,16 @@ Outcome run_experiments(ExperimentSetup setup, const ExperimentOptions& options,
     };
     try {
       if (interrupted()) throw Interrupted{};
-      outcome.sections.push_back(experiment(setup, folder));
+      sections.push_back(experiment(setup, folder));
     } catch (const Interrupted&) {
-      outcome.stopped_in = name;
-      break;
+      return {std::move(sections), name};
     } catch (const InputError& error) {
-      rethrow_with_rig(error, options);
+      // The library knows the rig, but not its file.
+      if (error.source() != "rig" || options.rig.empty()) throw;
+      throw error.with_source(options.rig);
     }
   }
-  return outcome;
+  return {std::move(sections), ""};
 }
 
 int run(const ExperimentOptions& options) {
@@ -148,12 +132,12 @@ int run(const ExperimentOptions& options) {
   inputs.add_rig(options.rig, setup.rig);
   OutputFolder folder(options.out, setup.rig, inputs, options.force, experiment_bytes);
   watch_for_interrupts();
-  Outcome outcome = run_experiments(std::move(setup), options, folder / "");
-  const std::string missing = missing_from(outcome.sections, outcome.stopped_in);
-  for (const ReportSection& section : outcome.sections) print(section);
+  auto [sections, stopped_in] = run_experiments(std::move(setup), options, folder / "");
+  const std::string missing = missing_from(sections, stopped_in);
+  for (const ReportSection& section : sections) print(section);
   if (!missing.empty()) std::printf("%s\n", missing.c_str());
-  if (outcome.sections.empty()) return 1;
-  write_report(folder / "report.html", report_of(std::move(outcome.sections), missing, options));
+  if (sections.empty()) return 1;
+  write_report(folder / "report.html", report_of(std::move(sections), missing, options));
   folder.commit();
   std::printf("report: %s\n", (fs::path(options.out) / "report.html").c_str());
   return missing.empty() ? 0 : 1;
@@ -165,8 +149,9 @@ void add_experiment(Command app, Run& run_later) {
   auto options = std::make_shared<ExperimentOptions>();
   Command command = app.add_subcommand("experiment", "The paper's experiments, in a simulator, as a report.");
   std::vector<std::string> choices{"all"};
-  for (const Named& named : experiments()) choices.push_back(named.name);
-  command.add_option("name", options->name, "Which: " + names()).required().one_of(choices);
+  std::string help = "Which: ";
+  for (const auto& [name, experiment] : experiments()) choices.push_back(name), help += name + ", ";
+  command.add_option("name", options->name, help + "all").required().one_of(choices);
   command
       .add_option("--out", options->out,
                   fmt::format("Folder for report.html, the CSVs behind it and rig.yaml{}", OutputFolder::help))

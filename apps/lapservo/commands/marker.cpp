@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
 #include <memory>
 #include <optional>
@@ -203,8 +202,7 @@ int run_show(const RigOptions& options) {
   }
   std::printf(
       "seen from %.0f mm with a focal length of %.0f px; worst sigma of psi by noise (%.2f px a boundary): %.2f mrad, "
-      "as lapservo measures it, by all visible lines; "
-      "%.1f mrad by the centre line alone\n"
+      "as lapservo measures it, by all visible lines; %.1f mrad by the centre line alone\n"
       "worst error of psi by boundaries that are printed %.1f mm off: %.0f mrad until `lapservo calibrate marker` has "
       "measured them\n",
       1e3 * viewing.distance_m, viewing.focal_px, viewing.sigma_edge_px, 1e3 * surface_rad,

@@ -1,5 +1,3 @@
-#include "apps/lapservo/commands/record.h"
-
 #include <array>
 #include <chrono>
 #include <cmath>
@@ -20,7 +18,7 @@
 #include "apps/lapservo/cli/interrupt.h"
 #include "apps/lapservo/cli/progress.h"
 #include "apps/lapservo/cli/subcommands.h"
-#include "apps/lapservo/commands/calibrate/calibrate_inputs.h"
+#include "apps/lapservo/commands/calibrate/calibrate_steps.h"
 #include "apps/lapservo/inputs/live_images.h"
 #include "apps/lapservo/inputs/transports.h"
 #include "lapservo/control/calibration_motion.h"
@@ -45,11 +43,6 @@ namespace {
 constexpr double patience_s = 15;    // for the first image
 constexpr double max_silence_s = 1;  // of the camera while the arm moves
 constexpr double least_swing = 1.2;  // of least_joint_travel: what growing and fading leave of a swing's ends
-
-// Stamps of this computer's cameras are on the monotonic clock, or missing; joints' are on that of 1970.
-double stamp_since_1970_s(double stamp_s, const Clock& clock) {
-  return since_1970_s() - (std::isfinite(stamp_s) ? clock.now_s() - stamp_s : 0);
-}
 
 // Writes arriving messages into the bag.
 class Recording {
@@ -89,9 +82,11 @@ class Recording {
     return {[this, topic](ImageMessage&& message) { add(topic, std::move(message)); },
             [this, topic](CompressedImageMessage&& message) { add(topic, std::move(message)); }};
   }
+  // Stamps of this computer's cameras are on the monotonic clock, or missing; joints' are on that of 1970.
   ImageSink sink_of_camera(const Clock& clock) {
     return {[this, &clock](ImageMessage&& message) {
-              message.stamp_s = stamp_since_1970_s(message.stamp_s, clock);
+              const double age_s = std::isfinite(message.stamp_s) ? clock.now_s() - message.stamp_s : 0;
+              message.stamp_s = since_1970_s() - age_s;
               add("/camera/image_raw", std::move(message));
             },
             {}};

@@ -1,10 +1,10 @@
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -17,18 +17,20 @@
 #include "apps/lapservo/cli/subcommands.h"
 #include "apps/lapservo/inputs/input_files.h"
 #include "lapservo/core/angles.h"
+#include "lapservo/core/atomic_file.h"
 #include "lapservo/core/error.h"
 #include "lapservo/core/random.h"
 #include "lapservo/io/image_file.h"
 #include "lapservo/io/tables/configuration_csv.h"
 #include "lapservo/io/video/video_writer.h"
+#include "lapservo/kinematics/centre_line.h"
+#include "lapservo/kinematics/features.h"
 #include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/kinematics/visibility.h"
 #include "lapservo/sim/blood.h"
 #include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/renderer.h"
 #include "lapservo/sim/tissue.h"
-#include "lapservo/sim/truth.h"
 
 namespace lapservo::app {
 using namespace internal;
@@ -41,6 +43,39 @@ struct RenderArguments {
   std::uint64_t seed = 1;
   bool moving = false, video = false, force = false;
   double fps = 30, light = 1, smoke = 0, blood = 0, noise = 1, blur_px = 0.8, motion = 0, film_mm = 0.1;
+};
+
+// The truth.csv beside rendered frames: what is where, per frame and instrument. The columns of ../shared/frames.
+class TruthCsv {
+ public:
+  explicit TruthCsv(const std::filesystem::path& path) : file_(path) {
+    file_.stream() << "file,instrument,condition,theta_rad,phi_rad,rho_m,psi_rad,tau_rad,"
+                      "e0_u_px,e0_v_px,e1_u_px,e1_v_px,e2_u_px,e2_v_px,e3_u_px,e3_v_px,"
+                      "s_rad,r_px,l_px,d_px,rcm_u_px,rcm_v_px\n";
+  }
+
+  // The instrument must have camera_from_rcm, and its marker lie before the camera (else std::invalid_argument).
+  void add(const std::string& file, const Camera& camera, const Instrument& instrument, const JointVector& q) {
+    const Rigid3& camera_from_rcm = instrument.camera_from_rcm.value();
+    const auto line = centre_line(camera, instrument.marker, camera_from_rcm * rcm_from_unrolled(q), q.psi_rad);
+    const auto rcm_px = projected_rcm_px(camera, camera_from_rcm);
+    if (!line || !rcm_px) throw std::invalid_argument("the marker does not lie before the camera");
+    const Features f = features_of(line->ideal_px, rcm_px);
+    std::string row = fmt::format("{},{},rendered,{:.7f},{:.7f},{:.7f},{:.7f},{:.7f}", file, instrument.name,
+                                  q.theta_rad, q.phi_rad, q.rho_m, q.psi_rad, line->tau_rad);
+    for (const Eigen::Vector2d& ideal : line->ideal_px) {
+      const Eigen::Vector2d raw = camera.raw_from_ideal(ideal);
+      row += fmt::format(",{:.7f},{:.7f}", raw.x(), raw.y());
+    }
+    row += fmt::format(",{:.7f},{:.7f},{:.7f},{:.7f},{:.7f},{:.7f}", f.s_rad, *f.r_px, f.l_px, f.d_px, rcm_px->x(),
+                       rcm_px->y());
+    file_.stream() << row << '\n';
+  }
+
+  void commit() { file_.commit(); }
+
+ private:
+  AtomicFile file_;
 };
 
 JointVector random_configuration(const Camera& camera, const Instrument& instrument, const std::string& rig,
@@ -155,7 +190,7 @@ int run(const RenderArguments& options) {
       const std::string name = fmt::format("{:04}.{}", i, options.format);
       for (std::size_t k = 0; k < rig.instruments.size(); ++k) {
         try {
-          truth.add(name, "rendered", rig.camera, rig.instruments[k], frames[i][k]);
+          truth.add(name, rig.camera, rig.instruments[k], frames[i][k]);
         } catch (const std::invalid_argument& error) {
           throw InputError(options.poses, fmt::format("frame {}: {}", i, error.what()));
         }

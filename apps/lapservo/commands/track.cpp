@@ -1,14 +1,16 @@
 #include <algorithm>
+#include <chrono>
 #include <cstdio>
-#include <cstdlib>
 #include <filesystem>
 #include <functional>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <set>
 #include <string>
 #include <system_error>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -21,12 +23,14 @@
 #include "apps/lapservo/inputs/frame_input.h"
 #include "apps/lapservo/inputs/input_files.h"
 #include "apps/lapservo/inputs/joint_input.h"
-#include "apps/lapservo/inputs/live_frames.h"
-#include "apps/lapservo/inputs/live_wrist.h"
+#include "apps/lapservo/inputs/live_images.h"
 #include "apps/lapservo/inputs/transports.h"
+#include "cameras/live_source.h"
 #include "lapservo/calibration/check/frame_diagnosis.h"
 #include "lapservo/calibration/check/usual_cause.h"
 #include "lapservo/core/error.h"
+#include "lapservo/crtk/transport.h"
+#include "lapservo/crtk/wrist_history.h"
 #include "lapservo/io/frame_source.h"
 #include "lapservo/io/image_file.h"
 #include "lapservo/io/overlay.h"
@@ -37,6 +41,7 @@
 #include "lapservo/rig/registration_text.h"
 #include "lapservo/robot/steady_clock.h"
 #include "lapservo/servo/registration_watch.h"
+#include "lapservo/tool/wrist.h"
 #include "lapservo/vision/tracker.h"
 
 namespace lapservo::app {
@@ -53,12 +58,78 @@ struct TrackOptions : FrameOptions {
   int frames = 0;
 };
 
+// The node's name, in all of the command that reads a topic's images.
+constexpr auto live_node_name = "lapservo_track";
+
+// A topic's images as frames to be measured: the newest each time, until Ctrl-C.
+class LiveFrames : public LiveSource {
+ public:
+  LiveFrames(const std::string& text, const Camera& camera)
+      : LiveSource(interrupted),
+        text_(text),
+        transports_(live_node_name),
+        images_(text, "input", camera, clock_, transports_) {}
+
+  /// Age of the last frame, since its arrival.
+  double age_s() const { return clock_.now_s() - last_s_; }
+  /// Counts of unusable images, in words; empty when there were none.
+  std::string dropped() const { return images_.counts().text(); }
+
+ protected:
+  std::optional<StampedImage> take() override {
+    auto image = images_.newest();
+    if (image) last_s_ = image->time_s;
+    if (!image) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    return image;
+  }
+  std::optional<std::string> ended() const override { return images_.ended(); }
+  std::string why_none() override {
+    return dropped().empty() ? transports_.unpublished(text_, "input") : images_.complaint();
+  }
+
+ private:
+  std::string text_;
+  Transports transports_;
+  LiveImages images_;
+  double last_s_ = 0;
+};
+
+// The joints of wrists as a topic has them.
+class LiveWrist {
+ public:
+  /// `topic`: "ros2:/PSM1/measured_js". Throws InputError for another text and a transport that this build lacks.
+  explicit LiveWrist(const std::string& topic) {
+    const Address address = address_of(topic, "--joints");
+    transport_ = make_transport(address.transport, "lapservo_wrist", "--joints");
+    subscription_ = transport_->subscribe_joints(address.name, [this](JointMessage&& message) {
+      const std::lock_guard lock(mutex_);
+      history_.add(std::move(message), clock_.now_s());
+    });
+  }
+
+  /// At the exposure of a frame that arrived at this time of SteadyClock, in the order of Tool::wrist; empty where no
+  /// message that came near then has all of them.
+  std::vector<double> at_exposure(const Instrument& instrument, double arrival_s) const {
+    // A longer delay, or one below 0, is that of a recording by two clocks.
+    constexpr double longest_s = WristHistory::kept_s - WristHistory::near_s;
+    const double delay_s = instrument.image_delay_s.value_or(0);
+    const double exposure_s = arrival_s - (delay_s >= 0 && delay_s <= longest_s ? delay_s : 0);
+    const std::lock_guard lock(mutex_);
+    return history_.at(wrist_names(instrument.tool), exposure_s);
+  }
+
+ private:
+  SteadyClock clock_;
+  std::unique_ptr<Transport> transport_;
+  mutable std::mutex mutex_;
+  WristHistory history_;
+  Transport::Subscription subscription_;  // last: it uses the others
+};
+
 // The inputs that are known before the first frame; rigs beside the frames come with them.
 InputFiles inputs_of(const TrackOptions& options) {
   InputFiles inputs;
-  std::error_code error;
-  inputs.add(options.input), inputs.add(options.joints);
-  if (fs::is_directory(options.input, error)) inputs.add_pictures_in(options.input);
+  inputs.add(options.input), inputs.add(options.joints), inputs.add_pictures_in(options.input);
   return inputs;
 }
 
@@ -70,9 +141,8 @@ void refuse_outputs(const TrackOptions& options, const InputFiles& inputs) {
 }
 
 void expect_wrist(const TrackOptions& options, const fs::path& path, const Rig& rig) {
-  const bool has_wrist = std::any_of(rig.instruments.begin(), rig.instruments.end(), [](const Instrument& instrument) {
-    return instrument.tool && !instrument.tool->wrist.empty();
-  });
+  const bool has_wrist = std::ranges::any_of(
+      rig.instruments, [](const Instrument& instrument) { return instrument.tool && !instrument.tool->wrist.empty(); });
   if (!options.joints.empty() && !has_wrist)
     throw InputError("--joints", fmt::format("is {}, expected a tool with a wrist in {}, whose joints it would have",
                                              options.joints, path.string()));
@@ -182,11 +252,6 @@ void say_moved(const TrackOptions& options, const Frame& frame) {
                "off: %s\n",
                options.input.c_str(), RegistrationWatch::frames - 1, frame.index, frame.time_s, misses_rcm_text,
                measure_registration_text);
-}
-
-[[noreturn]] void rethrow_with_frame(const InputError& error, const TrackOptions& options, const Frame& frame) {
-  if (error.source() == "image") throw error.with_source(frame.file.empty() ? options.input : frame.file.string());
-  throw error;
 }
 
 // Null where the frames are no topic's.
@@ -300,7 +365,8 @@ class TrackRun {
         diagnosis().add(frame->bgr, observations);
         if ((stopped_ = !pass_on(*frame, observations, came_s))) return;
       } catch (const InputError& error) {
-        rethrow_with_frame(error, options_, *frame);
+        if (error.source() != "image") throw;
+        throw error.with_source(frame->file.empty() ? options_.input : frame->file.string());
       }
       progress.show(tally_.frames, tally_.text());
       const double next_s = begin_s_ + frame->time_s + 1 / source_.frames_per_second();

@@ -1,14 +1,16 @@
 #include "apps/lapservo/inputs/frame_input.h"
 
 #include <cstdio>
+#include <memory>
+#include <optional>
 #include <set>
+#include <string>
 #include <utility>
 
 #include "apps/lapservo/cli/interrupt.h"
 #include "cameras/camera.h"
 #include "lapservo/calibration/recording/frame_recording.h"
 #include "lapservo/core/error.h"
-#include "lapservo/io/half_frames.h"
 #include "lapservo/io/video/read_ahead.h"
 #include "recordings/bag_frames.h"
 #include "recordings/open_bag.h"
@@ -25,6 +27,38 @@ void say_remark(const std::string& input, const std::string& remark) {
 
 namespace {
 
+// One half of each frame, which shows both eyes of an endoscope side by side; `name`: of the source. Throws InputError
+// where their width is odd.
+class HalfFrames : public FrameSource {
+ public:
+  HalfFrames(std::unique_ptr<FrameSource> source, bool is_left, std::string name)
+      : source_(std::move(source)), is_left_(is_left), name_(std::move(name)) {}
+
+  std::optional<Frame> next() override {
+    auto frame = source_->next();
+    if (!frame || frame->bgr.empty()) return frame;
+    if (frame->bgr.cols % 2 != 0)
+      throw InputError(name_, "has frames of " + std::to_string(frame->bgr.cols) +
+                                  " columns, expected an even number: two eyes side by side");
+    const int width = frame->bgr.cols / 2;
+    frame->bgr = frame->bgr.colRange(is_left_ ? 0 : width, is_left_ ? width : 2 * width).clone();
+    return frame;
+  }
+  Kind kind() const override { return source_->kind(); }
+  std::optional<int> frame_count() const override { return source_->frame_count(); }
+  double frames_per_second() const override { return source_->frames_per_second(); }
+  std::optional<double> first_stamp_s() const override { return source_->first_stamp_s(); }
+  std::string remark() const override { return source_->remark(); }
+  bool is_srgb() const override { return source_->is_srgb(); }
+  bool is_lossy() const override { return source_->is_lossy(); }
+  std::string complaint() const override { return source_->complaint(); }
+
+ private:
+  std::unique_ptr<FrameSource> source_;
+  bool is_left_;
+  std::string name_;
+};
+
 // `layout`: LR or RL where the input says that it has both eyes.
 std::unique_ptr<FrameSource> of_one_eye(std::unique_ptr<FrameSource> frames, const std::string& input,
                                         const FrameOptions& options, const std::string& layout) {
@@ -34,21 +68,18 @@ std::unique_ptr<FrameSource> of_one_eye(std::unique_ptr<FrameSource> frames, con
     throw InputError("--eye",
                      "is missing, expected left or right: " + input + " has both eyes side by side (" + order + ")");
   const bool is_first = (options.eye == "left") == (order != "RL");
-  return half_frames(std::move(frames), is_first ? Half::left : Half::right, input);
+  return std::make_unique<HalfFrames>(std::move(frames), is_first, input);
 }
 
-struct WholeFrames {
-  std::unique_ptr<FrameSource> source;
-  std::string layout;  // of both eyes, where the input says it
-};
-
-WholeFrames open_whole(const std::string& input, const FrameOptions& options, const Camera* camera) {
+// With the layout of both eyes, where the input says it.
+std::pair<std::unique_ptr<FrameSource>, std::string> open_whole(const std::string& input, const FrameOptions& options,
+                                                                const Camera* camera) {
   const VideoReading reading{options.deinterlace || (camera && camera->deinterlace), options.colour_matrix,
                              options.chroma_location};
   if (is_bag(input)) {
     auto frames = std::make_unique<BagFrames>(open_bag(input), options.image_topic);
     say_if_undistorted(frames->topic(), camera);
-    return {std::move(frames), {}};
+    return {std::move(frames), std::string()};
   }
 #ifdef LAPSERVO_BAGS
   if (is_session(input)) {
@@ -59,14 +90,14 @@ WholeFrames open_whole(const std::string& input, const FrameOptions& options, co
   refuse_topic_outside_bags("--image-topic", options.image_topic, input);
   const int eyes = options.eye.empty() ? 1 : 2;
   const cv::Size size = camera ? cv::Size(eyes * camera->width_px, camera->height_px) : cv::Size();
-  return {open_camera_or_file(input, options.fps, size, interrupted, reading), {}};
+  return {open_camera_or_file(input, options.fps, size, interrupted, reading), std::string()};
 }
 
 }  // namespace
 
 std::unique_ptr<FrameSource> open_frames(const std::string& input, const FrameOptions& options, const Camera* camera) {
-  WholeFrames whole = open_whole(input, options, camera);
-  auto source = of_one_eye(std::move(whole.source), input, options, whole.layout);
+  auto [whole, layout] = open_whole(input, options, camera);
+  auto source = of_one_eye(std::move(whole), input, options, layout);
   if (camera) expect_srgb(*source, input, camera->response);
   say_remark(input, source->remark());
   return source->kind() == FrameSource::Kind::live ? std::move(source) : read_ahead(std::move(source));

@@ -26,7 +26,7 @@ class InputFiles {
   void add(const std::filesystem::path& path);
   /// The file and the camera's, where the rig has one.
   void add_rig(const std::filesystem::path& path, const Rig& rig);
-  /// The images in a folder and the rigs beside them, or a bag's files.
+  /// The images in a folder and the rigs beside them, or a bag's files; none of what is no folder.
   void add_pictures_in(const std::filesystem::path& folder);
 
   /// Throws InputError when the file is one of them.

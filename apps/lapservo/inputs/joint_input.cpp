@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <memory>
-#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -55,9 +53,8 @@ std::optional<Joints> wrist_joints(const Tool& tool, const std::vector<std::stri
   const std::vector<std::string> names = wrist_names(tool);
   Joints joints;
   for (std::size_t i = 0; i < joints.names.size(); ++i) {
-    const auto found = std::find_if(recorded.begin(), recorded.end(), [&](const std::string& name) {
-      return is_same_joint(name, names[i % names.size()]);
-    });
+    const auto found = std::ranges::find_if(
+        recorded, [&](const std::string& name) { return is_same_joint(name, names[i % names.size()]); });
     if (found == recorded.end()) return std::nullopt;
     joints.names[i] = *found;
   }

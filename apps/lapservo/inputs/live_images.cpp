@@ -9,14 +9,6 @@
 
 namespace lapservo::app {
 using namespace internal;
-namespace {
-
-Transport::Subscription subscribe(Transport& transport, const std::string& topic, const ImageSink& sink) {
-  return topic.ends_with("/compressed") ? transport.subscribe_compressed_images(topic, sink.compressed)
-                                        : transport.subscribe_images(topic, sink.image);
-}
-
-}  // namespace
 
 Transport& Transports::get(const std::string& transport, const std::string& option) {
   auto& made = transports_[transport];
@@ -44,7 +36,10 @@ ImageInput open_images(const std::string& text, const std::string& option, const
                        ImageSink sink) {
   if (names_topic(text)) {
     const Address address = address_of(text, option);
-    return {subscribe(transports.get(address.transport, option), address.name, sink), nullptr};
+    Transport& transport = transports.get(address.transport, option);
+    return {address.name.ends_with("/compressed") ? transport.subscribe_compressed_images(address.name, sink.compressed)
+                                                  : transport.subscribe_images(address.name, sink.image),
+            nullptr};
   }
   if (!names_camera(text))
     throw InputError(option, (text.empty() ? "is missing" : "is " + text) +

@@ -1,7 +1,6 @@
 #include "lapservo/io/pictures/exif_orientation.h"
 
 #include <cstddef>
-#include <cstring>
 #include <string_view>
 
 #include "lapservo/io/pictures/jpeg_segments.h"
@@ -9,11 +8,8 @@
 
 namespace lapservo::internal {
 namespace {
+using namespace std::string_view_literals;
 using Bytes = std::span<const std::uint8_t>;
-
-bool begins_with(Bytes bytes, std::string_view magic) {
-  return bytes.size() >= magic.size() && std::memcmp(bytes.data(), magic.data(), magic.size()) == 0;
-}
 
 Bytes from(Bytes bytes, std::size_t at) {
   return at < bytes.size() ? bytes.subspan(at) : Bytes{};
@@ -22,7 +18,7 @@ Bytes from(Bytes bytes, std::size_t at) {
 // A directory as TIFF has it, in either order of bytes. Its entries are a tag, a type, a count and a value.
 std::optional<std::size_t> of_directory(Bytes bytes) {
   constexpr std::size_t entry_bytes = 12, orientation = 0x0112, is_short = 3;
-  if (!begins_with(bytes, {"MM\0*", 4}) && !begins_with(bytes, {"II*\0", 4})) return std::nullopt;
+  if (!text_of(bytes).starts_with("MM\0*"sv) && !text_of(bytes).starts_with("II*\0"sv)) return std::nullopt;
   const Numbers numbers{bytes, bytes[0] == 'M'};
   const std::size_t directory = numbers.of(4, 4);
   for (std::size_t i = 0; i < numbers.of(directory, 2); ++i) {
@@ -33,15 +29,15 @@ std::optional<std::size_t> of_directory(Bytes bytes) {
 }
 
 std::optional<std::size_t> of_exif(Bytes bytes) {
-  constexpr std::string_view prefix("Exif\0\0", 6);
-  return of_directory(begins_with(bytes, prefix) ? from(bytes, prefix.size()) : bytes);
+  constexpr std::string_view prefix = "Exif\0\0"sv;
+  return of_directory(text_of(bytes).starts_with(prefix) ? from(bytes, prefix.size()) : bytes);
 }
 
 // Segments up to the start of the scan.
 std::optional<std::size_t> of_jpeg(Bytes bytes) {
   for (auto segment = jpeg_segment(bytes, 2); segment && segment->marker != 0xda;
        segment = jpeg_segment(bytes, segment->end))
-    if (segment->marker == 0xe1 && begins_with(segment->content, "Exif")) return of_exif(segment->content);
+    if (segment->marker == 0xe1 && text_of(segment->content).starts_with("Exif")) return of_exif(segment->content);
   return std::nullopt;
 }
 
@@ -50,7 +46,7 @@ std::optional<std::size_t> of_chunks(Bytes bytes, std::size_t first, bool png) {
   const Numbers numbers{bytes, png};
   for (std::size_t at = first; at + 8 <= bytes.size();) {
     const std::size_t length = numbers.of(png ? at : at + 4, 4);
-    if (begins_with(from(bytes, png ? at + 4 : at), png ? "eXIf" : "EXIF")) return of_exif(from(bytes, at + 8));
+    if (text_of(from(bytes, png ? at + 4 : at)).starts_with(png ? "eXIf" : "EXIF")) return of_exif(from(bytes, at + 8));
     at += 8 + length + (png ? 4 : length % 2);
   }
   return std::nullopt;
@@ -59,9 +55,9 @@ std::optional<std::size_t> of_chunks(Bytes bytes, std::size_t first, bool png) {
 }  // namespace
 
 std::optional<std::size_t> exif_orientation(Bytes picture) {
-  if (begins_with(picture, "\xff\xd8")) return of_jpeg(picture);
-  if (begins_with(picture, "\x89PNG")) return of_chunks(picture, 8, true);
-  if (begins_with(picture, "RIFF")) return of_chunks(picture, 12, false);
+  if (text_of(picture).starts_with("\xff\xd8")) return of_jpeg(picture);
+  if (text_of(picture).starts_with("\x89PNG")) return of_chunks(picture, 8, true);
+  if (text_of(picture).starts_with("RIFF")) return of_chunks(picture, 12, false);
   return std::nullopt;
 }
 

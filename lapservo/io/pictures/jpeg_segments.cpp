@@ -7,11 +7,6 @@
 namespace lapservo::internal {
 namespace {
 
-// Within scans 00 follows an FF that is data.
-bool is_marker(std::uint8_t byte) {
-  return byte != 0 && byte != 0xff;
-}
-
 bool stands_alone(std::uint8_t marker) {
   return marker == 0x01 || (marker >= 0xd0 && marker <= 0xd9);
 }
@@ -20,7 +15,8 @@ bool stands_alone(std::uint8_t marker) {
 
 std::optional<JpegSegment> jpeg_segment(std::span<const std::uint8_t> jpeg, std::size_t from) {
   for (std::size_t at = from; at + 2 <= jpeg.size(); ++at) {
-    if (jpeg[at] != 0xff || !is_marker(jpeg[at + 1])) continue;
+    // Within scans 00 follows an FF that is data.
+    if (jpeg[at] != 0xff || jpeg[at + 1] == 0 || jpeg[at + 1] == 0xff) continue;
     const std::size_t content = at + (stands_alone(jpeg[at + 1]) ? 2 : 4);
     const std::size_t length = Numbers{jpeg, true}.of(at + 2, 2);
     const std::size_t end = content == at + 2 ? content : at + 2 + std::max<std::size_t>(length, 2);

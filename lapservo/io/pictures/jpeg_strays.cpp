@@ -123,12 +123,10 @@ bool are_few(Bytes strays) {
 }
 
 bool is_all_but_strays(const Scan& blocks, const Scan& all) {
-  return std::equal(blocks.intervals.begin(), blocks.intervals.end(), all.intervals.begin(), all.intervals.end(),
-                    [](Bytes of_blocks, Bytes data) {
-                      return data.size() >= of_blocks.size() &&
-                             std::equal(of_blocks.begin(), of_blocks.end(), data.begin()) &&
-                             are_few(data.subspan(of_blocks.size()));
-                    });
+  return std::ranges::equal(blocks.intervals, all.intervals, [](Bytes of_blocks, Bytes data) {
+    return data.size() >= of_blocks.size() && std::equal(of_blocks.begin(), of_blocks.end(), data.begin()) &&
+           are_few(data.subspan(of_blocks.size()));
+  });
 }
 
 }  // namespace

@@ -102,8 +102,7 @@ bool names_software_encoder(std::span<const std::uint8_t> bytes) {
   using namespace std::string_view_literals;
   constexpr std::array names{"x264 - core"sv, "x265 (build"sv, "Lavc"sv};
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  return std::any_of(names.begin(), names.end(),
-                     [&](std::string_view name) { return text.find(name) != std::string_view::npos; });
+  return std::ranges::any_of(names, [&](std::string_view name) { return text.find(name) != std::string_view::npos; });
 }
 
 GivenColours given_colours(const std::string& colour_matrix, const std::string& chroma_location) {

@@ -12,12 +12,10 @@
 #include <vector>
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include "apps/lapservo/cli/interrupt.h"
 #include "apps/lapservo/cli/subcommands.h"
 #include "apps/lapservo/commands/calibrate/calibrate_steps.h"
-#include "apps/lapservo/commands/record.h"
 #include "apps/lapservo/inputs/joint_input.h"
 #include "lapservo/core/error.h"
 #include "lapservo/rig/calibration_record.h"
@@ -353,8 +351,7 @@ void add_calibrate_all(Command parent, Run& run_later) {
   command.add_flag("--no-questions", options->no_questions,
                    "Leave out what no option names; a terminal prompts for it");
   command.footer(
-      "RIG.calibration.yaml beside the rig lists each step with its command and time: a second run goes on "
-      "where\n"
+      "RIG.calibration.yaml beside the rig lists each step with its command and time: a second run goes on where\n"
       "the first one stopped. A step is done again when its recording, its command, an earlier step or the rig "
       "changed.\n"
       "Example:\n  lapservo calibrate all --rig rig.yaml --boards boards/ --board 9x6 --square-mm 5 --turn turn.mp4 "

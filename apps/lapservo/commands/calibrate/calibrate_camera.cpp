@@ -1,10 +1,8 @@
 #include <algorithm>
 #include <cstdio>
-#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
-#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -24,17 +22,12 @@
 namespace lapservo::app {
 using namespace internal;
 namespace {
-namespace fs = std::filesystem;
 
 void check_files(const CalibrateCameraOptions& options, const std::optional<Rig>& rig) {
   if (options.rig.empty() && options.out.empty() && options.camera_info.empty())
     throw InputError("calibrate camera", "has no place for its result, expected --rig, --out or --camera-info");
   InputFiles files;
-  std::error_code error;
-  for (const std::string& input : options.inputs) {
-    files.add(input);
-    if (fs::is_directory(input, error)) files.add_pictures_in(input);
-  }
+  for (const std::string& input : options.inputs) files.add(input), files.add_pictures_in(input);
   for (const std::string& place : {options.rig_out(), options.camera_info}) files.refuse_as_output(place);
   refuse_shared_place({options.rig_out(), options.camera_info});
   for (const std::string& place : {options.camera_info, rig ? std::string() : options.out}) {

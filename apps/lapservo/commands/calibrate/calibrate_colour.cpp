@@ -9,7 +9,6 @@
 #include "apps/lapservo/inputs/frame_input.h"
 #include "lapservo/calibration/colour/colour_measurement.h"
 #include "lapservo/core/atomic_file.h"
-#include "lapservo/rig/rig_writer.h"
 
 namespace lapservo::app {
 using namespace internal;
@@ -42,10 +41,7 @@ int calibrate_colour(const CalibrateColourOptions& options) {
   if (!measured.read.stopped) say_complaint(options.input, measured.read.complaint);
   if (!calibration.refusal.empty()) return refuse_calibration(options, calibration.refusal);
   print(instrument, calibration, measured.frames);
-  out.stream() << rig_yaml(with_colour(rig, index, calibration), options.out);
-  out.commit();
-  std::printf("rig: %s\n", options.out.c_str());
-  return 0;
+  return write_rig(out, with_colour(rig, index, calibration), options.out);
 }
 
 void add_calibrate_colour(Command parent, Run& run_later) {

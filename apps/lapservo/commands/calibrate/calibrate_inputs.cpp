@@ -1,14 +1,9 @@
 #include "apps/lapservo/commands/calibrate/calibrate_inputs.h"
 
-#include <algorithm>
 #include <cstdio>
-#include <filesystem>
 #include <memory>
 #include <optional>
-#include <system_error>
 #include <vector>
-
-#include <fmt/format.h>
 
 #include "apps/lapservo/cli/interrupt.h"
 #include "apps/lapservo/cli/progress.h"
@@ -16,10 +11,10 @@
 #include "apps/lapservo/inputs/input_files.h"
 #include "lapservo/core/error.h"
 #include "lapservo/rig/instrument_index.h"
+#include "lapservo/rig/rig_writer.h"
 
 namespace lapservo::app {
 using namespace internal;
-namespace fs = std::filesystem;
 
 void add_board_options(Command command, BoardOptions& options, bool required) {
   auto corners =
@@ -64,10 +59,7 @@ std::size_t named_instrument(const Rig& rig, const std::string& name, const std:
 
 void refuse_outputs_over_inputs(const CalibrateOptions& options, const Rig& rig) {
   InputFiles inputs;
-  inputs.add(options.input), inputs.add(options.joints);
-  std::error_code error;
-  for (const std::string& input : {options.input, options.joints})
-    if (fs::is_directory(input, error)) inputs.add_pictures_in(input);
+  for (const std::string& input : {options.input, options.joints}) inputs.add(input), inputs.add_pictures_in(input);
   for (const std::string& out : {options.out, options.report, options.dvrk.base_frame}) inputs.refuse_as_output(out);
   refuse_shared_place({options.out, options.report, options.dvrk.base_frame});
   refuse_other_kind(options.out, ".yaml"), refuse_other_kind(options.report, ".html");
@@ -99,6 +91,13 @@ JobWatch watched_job() {
             stage->total = total, stage->done = done;
             stage->progress->show(done, remark);
           }};
+}
+
+int write_rig(AtomicFile& out, const Rig& rig, const std::string& path) {
+  out.stream() << rig_yaml(rig, path);
+  out.commit();
+  std::printf("rig: %s\n", path.c_str());
+  return 0;
 }
 
 int refuse_calibration(const CalibrateOptions& options, const std::string& why) {

@@ -5,13 +5,18 @@
 #include <vector>
 
 #include "apps/lapservo/cli/subcommands.h"
-#include "apps/lapservo/commands/calibrate/dvrk_output.h"
 #include "apps/lapservo/inputs/frame_input.h"
 #include "lapservo/calibration/camera/camera_measurement.h"
 #include "lapservo/calibration/recording/frame_recording.h"
+#include "lapservo/core/atomic_file.h"
 #include "lapservo/rig/rig.h"
 
 namespace lapservo::app {
+
+/// Options of `calibrate registration` for dVRK's software.
+struct DvrkOptions {
+  std::string base_frame, reference_frame = "camera", endoscope, set_base_frame;
+};
 
 /// Options of the subcommands that measure one instrument of a rig from frames.
 struct CalibrateOptions : FrameOptions {
@@ -52,6 +57,9 @@ void print_faults(const std::vector<std::string>& faults);
 
 /// Ends a job at Ctrl-C and shows its progress (progress.h), until it is destroyed.
 internal::JobWatch watched_job();
+
+/// Writes the rig with what was measured, and says where it is; returns the exit code.
+int write_rig(internal::AtomicFile& out, const Rig& rig, const std::string& path);
 
 /// Says on stderr why nothing was written; returns the exit code.
 int refuse_calibration(const CalibrateOptions& options, const std::string& why);

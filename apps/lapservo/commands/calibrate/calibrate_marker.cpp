@@ -2,11 +2,8 @@
 #include <cstdio>
 #include <memory>
 #include <optional>
-#include <string>
 #include <utility>
 #include <vector>
-
-#include <fmt/format.h>
 
 #include "apps/lapservo/cli/interrupt.h"
 #include "apps/lapservo/cli/subcommands.h"
@@ -16,7 +13,6 @@
 #include "lapservo/calibration/marker/marker_measurement.h"
 #include "lapservo/core/atomic_file.h"
 #include "lapservo/io/frame_source.h"
-#include "lapservo/rig/rig_writer.h"
 
 namespace lapservo::app {
 using namespace internal;
@@ -48,8 +44,7 @@ void print_scale(const Marker& before, const Marker& after) {
   if (alike)
     std::printf(
         "all bands are %.1f %% %s than the rig's: the printer scaled the sheet, or diameter_m is as much too %s: "
-        "measure "
-        "the print's length and the shaft's diameter by callipers\n",
+        "measure the print's length and the shaft's diameter by callipers\n",
         100 * std::abs(scale - 1), scale > 1 ? "longer" : "shorter", scale > 1 ? "large" : "small");
 }
 
@@ -87,10 +82,7 @@ int calibrate_marker(const CalibrateOptions& options) {
         "seam a little behind, psi is some mrad off; turn the instrument there and back\n");
   if (!joints) std::printf("seam_rad is the rig's: where the seam lies on the instrument takes --joints\n");
   rig.instruments[index].marker = calibration.marker;
-  out.stream() << rig_yaml(rig, options.out);
-  out.commit();
-  std::printf("rig: %s\n", options.out.c_str());
-  return 0;
+  return write_rig(out, rig, options.out);
 }
 
 void add_calibrate_marker(Command parent, Run& run_later) {

@@ -1,7 +1,6 @@
 #include <cmath>
 #include <cstdio>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,7 +21,6 @@
 #include "lapservo/core/error.h"
 #include "lapservo/core/rounded_covariance.h"
 #include "lapservo/core/statistics.h"
-#include "lapservo/rig/rig_writer.h"
 
 namespace lapservo::app {
 using namespace internal;
@@ -110,10 +108,7 @@ int calibrate_tip(CalibrateTipOptions options) {
   print(calibration);
   Tool& measured = rig.instruments[index].tool.emplace(calibration.tool);
   measured.place->covariance = rounded_covariance(measured.place->covariance);
-  out.stream() << rig_yaml(rig, options.out);
-  out.commit();
-  std::printf("rig: %s\n", options.out.c_str());
-  return 0;
+  return write_rig(out, rig, options.out);
 }
 
 }  // namespace
