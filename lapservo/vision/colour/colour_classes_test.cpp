@@ -100,7 +100,7 @@ TEST(ColourClasses, ReachAsFarToEitherSideOfAHue) {
   }
 }
 
-// Of other instruments, too, however their hues lie beside one another.
+// However the hues of several instruments lie beside one another.
 TEST(ColourClasses, EachBandHasItsOwnClass) {
   Random random(5);
   for (int i = 0; i < 200; ++i) {

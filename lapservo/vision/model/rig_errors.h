@@ -33,7 +33,7 @@ class RigErrors {
  private:
   const Camera* camera_ = nullptr;
   std::array<double, 4> response_px_{};
-  /// What length, wrap, gap and diameter move each boundary by: at the print's upper edge, at its lower one.
+  /// How far length, wrap, gap and diameter move each boundary: at the print's upper edge, at its lower one.
   std::array<std::array<Eigen::Vector2d, 4>, of_marker> along_m_{};
   Eigen::Vector3d nearer_m_ = Eigen::Vector3d::Zero();  ///< by the diameter, in the unrolled frame's axes
 };

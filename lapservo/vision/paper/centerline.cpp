@@ -220,7 +220,7 @@ double tau_from(const CrossRatioDecoder& decoder, const Edges& e) {
 
 using EdgesVector = Eigen::Matrix<double, 8, 1>;
 
-// What is uncertain of the boundaries, one sigma each: each errs along the line by itself, by `along_px`; all turn and
+// Uncertainties of the boundaries, one sigma each: each errs along the line by itself, by `along_px`; all turn and
 // shift across with the line's ends.
 std::array<EdgesVector, 6> errors_of(const Edges& edges, double along_px) {
   const double length_px = (edges[3] - edges[0]).norm();
