@@ -60,7 +60,7 @@ struct Process : testing::Process {
 class Spy {
  public:
   explicit Spy(Transport& transport)
-      : subscription_(transport.subscribe_joints("/PSM1/servo_jp", [this](JointMessage&& message) {
+      : subscription_(transport.subscribe<JointMessage>("/PSM1/servo_jp", [this](JointMessage&& message) {
           const std::lock_guard lock(mutex_);
           heard_.push_back(
               {message.stamp_s, q_from_joints(default_joints(), Eigen::Vector4d(message.positions.data()))});
@@ -238,7 +238,7 @@ class WireLoop : public ::testing::TestWithParam<std::string> {
   // New ears of this process, and a voice.
   void listen() {
     if (!ears_) ears_ = named_transport(GetParam(), "ears");
-    command_ = ears_->string_publisher("/lapservo/PSM1/command");
+    command_ = ears_->publisher<StringMessage>("/lapservo/PSM1/command");
     spy_.reset();
     spy_ = std::make_unique<Spy>(*ears_);
   }
@@ -374,7 +374,7 @@ TEST_P(WireLoop, TrackPublishesFrames) {
 TEST_P(WireLoop, GoesOnBesideAnArmThatHoldsTheEndoscope) {
   listen();
   std::atomic<bool> tells = true, ended = false;
-  const auto ecm = ears_->place_publisher("/ECM/local/measured_cp");
+  const auto ecm = ears_->publisher<PlaceMessage>("/ECM/local/measured_cp");
   std::thread arm([&] {
     for (; !ended; sleep(0.01))
       if (tells) ecm({since_1970_s(), "ECM_base", {Eigen::Quaterniond(0.6, 0, 0.8, 0), {0.1, 0, 0.2}}});
@@ -486,7 +486,7 @@ TEST_P(FirstWireLoop, RecordsAnArmThatItMovesAndCalibratesFromIt) {
   // The same for dVRK: published for a resting endoscope, and as a file for one that an ECM holds.
   std::optional<PlaceMessage> base_frame;
   std::mutex mutex;
-  const auto subscription = ears_->subscribe_places("/PSM1/set_base_frame", [&](PlaceMessage&& message) {
+  const auto subscription = ears_->subscribe<PlaceMessage>("/PSM1/set_base_frame", [&](PlaceMessage&& message) {
     const std::lock_guard lock(mutex);
     base_frame = message;
   });
@@ -503,7 +503,7 @@ TEST_P(FirstWireLoop, RecordsAnArmThatItMovesAndCalibratesFromIt) {
     EXPECT_LT((base_frame->pose.translation - dvrk_from_rcm.translation).norm(), 1e-9);
   }
   EXPECT_NE(said("base.json").find("\"base_frame\""), std::string::npos) << said("base.json");
-  const auto ecm = ears_->place_publisher("/ECM/local/measured_cp");
+  const auto ecm = ears_->publisher<PlaceMessage>("/ECM/local/measured_cp");
   Process held(calibrate + "--endoscope " + GetParam() + ":ECM", file("held.txt"));
   wait_for([&] {
     return ecm({since_1970_s(), "ECM_base", {}}), said("base.json").find("\"name\"") != std::string::npos;
@@ -525,7 +525,7 @@ TEST_P(FirstWireLoop, RecordsAnArmThatItMovesAndCalibratesFromIt) {
 
 TEST_P(WireLoop, ASecondPublisherIsNoticedWithin100MillisecondsAndHoldsUntilAStart) {
   const auto foreign = named_transport(GetParam(), "foreign");
-  const auto say = foreign->joint_publisher("/PSM1/servo_jp");
+  const auto say = foreign->publisher<JointMessage>("/PSM1/servo_jp");
   begin();
   ASSERT_TRUE(moves());
   const double first_s = since_1970_s();
@@ -547,8 +547,8 @@ TEST_P(WireLoop, ASecondPublisherIsNoticedWithin100MillisecondsAndHoldsUntilASta
 
 TEST_P(WireLoop, MovesOnlyWhileTheOperatorPressesAPedalOfEitherType) {
   const auto pedals = named_transport(GetParam(), "pedals");
-  const auto joy = pedals->joy_publisher("/footpedals/coag");
-  const auto button = pedals->bool_publisher("/operator_present");
+  const auto joy = pedals->publisher<JoyMessage>("/footpedals/coag");
+  const auto button = pedals->publisher<BoolMessage>("/operator_present");
   for (const bool is_joy : {true, false}) {
     const std::string topic = is_joy ? "/footpedals/coag" : "/operator_present";
     SCOPED_TRACE(topic);
@@ -630,8 +630,8 @@ TEST_P(WireLoop, ATopicThatNobodyPublishesEndsWithTheTopicsThatAreThere) {
 
 TEST_P(FirstWireLoop, StopsAndStartsAndTakesSetPointsAndTrajectoriesByTopic) {
   begin();
-  const auto wish = ears_->joint_publisher("/lapservo/PSM1/set_point");
-  const auto plan = ears_->trajectory_publisher("/lapservo/PSM1/trajectory");
+  const auto wish = ears_->publisher<JointMessage>("/lapservo/PSM1/set_point");
+  const auto plan = ears_->publisher<TrajectoryMessage>("/lapservo/PSM1/trajectory");
   ASSERT_TRUE(moves());
   command_({since_1970_s(), "stop"});
   expect_soon_said("hold: held");

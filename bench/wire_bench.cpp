@@ -65,7 +65,7 @@ void be_the_arm(const Options& options, const Rig& rig, int to) {
   SimRobot robot(*transport, rig, simulator, config);
   std::mutex mutex;
   std::vector<double> sent_s;
-  auto subscription = transport->subscribe_joints("/PSM1/servo_jp", [&](JointMessage&& message) {
+  auto subscription = transport->subscribe<JointMessage>("/PSM1/servo_jp", [&](JointMessage&& message) {
     const std::lock_guard lock(mutex);
     sent_s.push_back(message.stamp_s);
   });
@@ -90,8 +90,8 @@ class TimedImages : public ImageStream {
       arrival_s_ = transport_.stamp_now_s();
       receiver_.receive(std::move(message), clock_.now_s());
     };
-    subscription_ = options.images == "raw" ? transport.subscribe_images(raw_topic, receive)
-                                            : transport.subscribe_compressed_images(compressed_topic, receive);
+    subscription_ = options.images == "raw" ? transport.subscribe<ImageMessage>(raw_topic, receive)
+                                            : transport.subscribe<CompressedImageMessage>(compressed_topic, receive);
   }
 
   std::optional<StampedImage> newest() override {

@@ -6,6 +6,7 @@
 #include <sys/random.h>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "lapservo/core/error.h"
 #include "lapservo/core/lower_case.h"
@@ -61,9 +62,7 @@ std::string random_token() {
   std::array<unsigned char, 32> bytes{};
   if (::getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size()))
     throw InputError("--listen", "needs a token, and the system gives no random numbers");
-  std::string text;
-  for (const unsigned char byte : bytes) text += fmt::format("{:02x}", byte);
-  return text;
+  return fmt::format("{:02x}", fmt::join(bytes, ""));
 }
 
 bool equal_in_constant_time(std::string_view a, std::string_view b) {

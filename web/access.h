@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-#include "web/http_message.h"
+#include "web/http_server.h"
 
 namespace lapservo::internal {
 

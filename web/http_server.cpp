@@ -56,13 +56,9 @@ MHD_Result add_header(void* headers, MHD_ValueKind, const char* key, const char*
   return MHD_YES;
 }
 
-MHD_Result add_query(void* request, MHD_ValueKind, const char* key, const char* value) {
-  static_cast<HttpRequest*>(request)->query.emplace(key, value ? value : "");
-  return MHD_YES;
-}
-
-MHD_Result add_cookie(void* request, MHD_ValueKind, const char* key, const char* value) {
-  static_cast<HttpRequest*>(request)->cookies.emplace(key, value ? value : "");
+template <auto values>
+MHD_Result add_to(void* request, MHD_ValueKind, const char* key, const char* value) {
+  (static_cast<HttpRequest*>(request)->*values).emplace(key, value ? value : "");
   return MHD_YES;
 }
 
@@ -162,8 +158,8 @@ struct HttpServer::Callbacks {
     request.method = method;
     request.path = url;
     MHD_get_connection_values(connection, MHD_HEADER_KIND, add_header, &request);
-    MHD_get_connection_values(connection, MHD_GET_ARGUMENT_KIND, add_query, &request);
-    MHD_get_connection_values(connection, MHD_COOKIE_KIND, add_cookie, &request);
+    MHD_get_connection_values(connection, MHD_GET_ARGUMENT_KIND, add_to<&HttpRequest::query>, &request);
+    MHD_get_connection_values(connection, MHD_COOKIE_KIND, add_to<&HttpRequest::cookies>, &request);
     exchange->peer->has_requested = true;
     self.set_deadline(*exchange->peer, self.limits_.answer_s);
     return exchange.release();
@@ -173,11 +169,6 @@ struct HttpServer::Callbacks {
 HttpServer::HttpServer(const std::string& address, int port, const std::string& option, const HttpLimits& limits,
                        Handler handler)
     : limits_(limits), handler_(std::move(handler)) {
-  open(address, port, option);
-  time_ = std::thread([this] { watch_time(); });
-}
-
-void HttpServer::open(const std::string& address, int port, const std::string& option) {
   const Address where = address_of(address, port, option);
   const unsigned v6 = where.any.sa_family == AF_INET6 ? MHD_USE_IPv6 : 0;
   daemon_ =
@@ -194,6 +185,7 @@ void HttpServer::open(const std::string& address, int port, const std::string& o
     throw InputError(option, "is " + address + ", where port " + std::to_string(port) + " can't be listened at (" +
                                  std::strerror(errno) + "), expected another port or an address of this computer");
   port_ = MHD_get_daemon_info(daemon_, MHD_DAEMON_INFO_BIND_PORT)->port;
+  time_ = std::thread([this] { watch_time(); });
 }
 
 HttpServer::~HttpServer() {

@@ -3,19 +3,42 @@
 #include <chrono>
 #include <condition_variable>
 #include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
-
-#include "web/http_message.h"
 
 struct MHD_Connection;
 struct MHD_Daemon;
 
 namespace lapservo::internal {
+
+/// A request without its body: none that has one is taken.
+struct HttpRequest {
+  std::string method, path;
+  std::multimap<std::string, std::string> headers;  ///< names in lower case
+  std::map<std::string, std::string> query;         ///< ?name=value
+  std::map<std::string, std::string> cookies{};
+
+  /// Value of a header that is there once; nullopt otherwise.
+  std::optional<std::string> header(const std::string& name) const {
+    return headers.count(name) == 1 ? std::optional(headers.find(name)->second) : std::nullopt;
+  }
+};
+
+struct HttpResponse {
+  int status = 200;
+  std::string type = "text/plain; charset=utf-8", body{};
+  std::vector<std::pair<std::string, std::string>> headers{};
+};
+
+inline HttpResponse plain(int status, const std::string& text) {
+  return {.status = status, .body = text + "\n"};
+}
 
 /// Limits on the cost of other programs' requests.
 struct HttpLimits {
@@ -55,7 +78,6 @@ class HttpServer {
   struct Exchange;
   struct Callbacks;
 
-  void open(const std::string& address, int port, const std::string& option);
   int answer(MHD_Connection* connection, Exchange& exchange);
   void set_deadline(Peer& peer, double from_now_s);
   void admit(Peer& peer);

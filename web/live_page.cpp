@@ -9,10 +9,11 @@
 #include <fmt/format.h>
 
 #include "lapservo/core/csv.h"
+#include "lapservo/core/joint_vector.h"
 #include "lapservo/io/overlay.h"
 #include "lapservo/io/pictures/jpeg_encoding.h"
+#include "lapservo/kinematics/feature_map.h"
 #include "web/page_files.h"
-#include "web/page_state.h"
 
 namespace lapservo::internal {
 namespace {
@@ -57,15 +58,77 @@ std::optional<HttpResponse> file_at(const std::string& path) {
 
 // The number in ?after=; an image's numbers begin with 1.
 long after_of(const HttpRequest& request) {
-  const auto after = request.query.find("after");
-  if (after == request.query.end()) return 0;
-  const auto number = parse_finite(after->second);
+  const auto number = number_of(request, "after");
   return number && *number >= 0 && *number < 1e15 ? std::lround(*number) : 0;
 }
 
 std::string jpeg_of(const PageImage& image) {
   const auto bytes = encode_jpeg(draw_overlay(image.bgr, *image.rig, image.observations), jpeg_quality);
   return {bytes.begin(), bytes.end()};
+}
+
+using json = nlohmann::ordered_json;
+
+json number(double value, double sigma) {
+  return {{"value", value}, {"sigma", sigma}};
+}
+
+json joints_of(const Observation::Rcm& rcm) {
+  const Eigen::Vector4d q = rcm.q.vector();
+  json joints = json::object();
+  for (std::size_t k = 0; k < JointVector::size; ++k) {
+    const auto i = static_cast<Eigen::Index>(k);
+    joints[std::string(JointVector::names[k])] = number(q[i], std::sqrt(rcm.covariance(i, i)));
+  }
+  return joints;
+}
+
+json features_of(const Features& features) {
+  return {{"s_rad", features.s_rad},
+          {"r_px", features.r_px ? json(*features.r_px) : json()},
+          {"l_px", features.l_px},
+          {"d_px", features.d_px}};
+}
+
+// As the page reads them; what is not known is null. `silent_s`: for so long no image has come, and what they were says
+// nothing of now.
+json json_of(const std::vector<Observation>& observations, std::optional<double> silent_s) {
+  json instruments = json::array();
+  for (const Observation& seen : observations) {
+    if (silent_s) {
+      instruments.push_back({{"name", seen.instrument}, {"status", fmt::format("no image for {:.0f} s", *silent_s)}});
+      continue;
+    }
+    json one{{"name", seen.instrument}, {"status", to_string(seen.status)}};
+    if (seen.status == Status::ok) {
+      one["tau_rad"] = number(seen.tau_rad, seen.sigma_tau_rad);
+      one["features"] = features_of(seen.features);
+      if (seen.rcm) one["q"] = joints_of(*seen.rcm);
+    }
+    instruments.push_back(std::move(one));
+  }
+  return instruments;
+}
+
+json json_of(const PageLoop& loop) {
+  const auto four = [](const std::optional<Eigen::Vector4d>& values, Eigen::Index i) {
+    return values ? json((*values)[i]) : json();
+  };
+  json features = json::array();
+  for (std::size_t k = 0; k < FeatureVector::size; ++k) {
+    const auto i = static_cast<Eigen::Index>(k);
+    features.push_back({{"name", FeatureVector::names[k]},
+                        {"measured", four(loop.features, i)},
+                        {"desired", four(loop.desired, i)},
+                        {"error", four(loop.error, i)}});
+  }
+  return {{"time_s", loop.time_s},       {"delay_s", loop.delay_s}, {"limited", loop.limited},
+          {"can_start", loop.can_start}, {"answer", loop.answer},   {"features", features}};
+}
+
+// Never throws for its text: what is no UTF-8 is replaced.
+std::string text_of(const json& value) {
+  return value.dump(-1, ' ', false, json::error_handler_t::replace);
 }
 
 }  // namespace
@@ -227,13 +290,13 @@ bool LivePage::operator_present() {
 }
 
 HttpResponse LivePage::state() {
-  nlohmann::ordered_json state{{"title", config_.title},
-                               {"has_loop", config_.has_loop},
-                               {"may_start", config_.may_start},
-                               {"has_run_button", config_.has_run_button},
-                               {"live", config_.live},
-                               {"ended", over_.load()},
-                               {"takes_tip_goals", config_.takes_tip_goals}};
+  json state{{"title", config_.title},
+             {"has_loop", config_.has_loop},
+             {"may_start", config_.may_start},
+             {"has_run_button", config_.has_run_button},
+             {"live", config_.live},
+             {"ended", over_.load()},
+             {"takes_tip_goals", config_.takes_tip_goals}};
   watched_ = true;
   const auto now = std::chrono::steady_clock::now();
   state["now_s"] = seconds(now.time_since_epoch());
@@ -245,9 +308,9 @@ HttpResponse LivePage::state() {
     observations = newest_.image.observations;
     if (config_.live && now - newest_.came > old) silent_s = seconds(now - newest_.came);
     state["images"] = newest_.number;
-    state["loop"] = told_ ? json_of(told_->loop) : nlohmann::ordered_json();
-    state["loop_age_s"] = told_ ? nlohmann::ordered_json(seconds(now - told_->when)) : nlohmann::ordered_json();
-    state["events"] = nlohmann::ordered_json::array();
+    state["loop"] = told_ ? json_of(told_->loop) : json();
+    state["loop_age_s"] = told_ ? json(seconds(now - told_->when)) : json();
+    state["events"] = json::array();
     if (told_)
       for (const Event& event : *told_->events)
         state["events"].push_back({{"time_s", event.time_s}, {"state", event.state}});

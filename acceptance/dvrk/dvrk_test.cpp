@@ -78,15 +78,15 @@ class Judge {
  public:
   explicit Judge(Transport& transport) {
     subscriptions_.push_back(
-        transport.subscribe_joints("/PSM1/measured_js", [this](JointMessage&& message) { hear(message); }));
-    subscriptions_.push_back(transport.subscribe_operating_state(
+        transport.subscribe<JointMessage>("/PSM1/measured_js", [this](JointMessage&& message) { hear(message); }));
+    subscriptions_.push_back(transport.subscribe<OperatingStateMessage>(
         "/PSM1/operating_state", [this](OperatingStateMessage&& message) { hear(message); }));
     for (const bool is_ecm : {false, true})
-      subscriptions_.push_back(transport.subscribe_places(is_ecm ? "/ECM/local/measured_cp" : "/PSM1/measured_cp",
-                                                          [this, is_ecm](PlaceMessage&& message) {
-                                                            const std::lock_guard lock(mutex_);
-                                                            (is_ecm ? ecm_ : tip_) = message.pose;
-                                                          }));
+      subscriptions_.push_back(transport.subscribe<PlaceMessage>(
+          is_ecm ? "/ECM/local/measured_cp" : "/PSM1/measured_cp", [this, is_ecm](PlaceMessage&& message) {
+            const std::lock_guard lock(mutex_);
+            (is_ecm ? ecm_ : tip_) = message.pose;
+          }));
   }
 
   struct Sample {
@@ -252,8 +252,8 @@ class PoweredArm {
  public:
   PoweredArm(Transport& transport, const std::string& name)
       : name_(name),
-        state_command_(transport.string_publisher("/" + name + "/state_command")),
-        state_(transport.subscribe_operating_state(
+        state_command_(transport.publisher<StringMessage>("/" + name + "/state_command")),
+        state_(transport.subscribe<OperatingStateMessage>(
             "/" + name + "/operating_state",
             [this](OperatingStateMessage&& message) { ready_ = message.state == "ENABLED" && message.is_homed; })) {}
   void power_on() {
@@ -278,10 +278,10 @@ class Teleoperation {
  public:
   explicit Teleoperation(Transport& transport)
       : mtmr_(transport, "MTMR"),
-        move_jp_(transport.joint_publisher("/MTMR/move_jp")),
-        enable_(transport.bool_publisher("/console/teleop/enable")),
-        pedal_(transport.joy_publisher("/console/emulate_operator_present")),
-        clutch_(transport.joy_publisher("/console/emulate_clutch")) {}
+        move_jp_(transport.publisher<JointMessage>("/MTMR/move_jp")),
+        enable_(transport.publisher<BoolMessage>("/console/teleop/enable")),
+        pedal_(transport.publisher<JoyMessage>("/console/emulate_operator_present")),
+        clutch_(transport.publisher<JoyMessage>("/console/emulate_clutch")) {}
   void power_on() { mtmr_.power_on(); }
   void press() {
     enable_({true});
@@ -314,7 +314,7 @@ class Teleoperation {
 class Spy {
  public:
   explicit Spy(Transport& transport)
-      : subscription_(transport.subscribe_joints("/PSM1/servo_jp", [this](JointMessage&& message) {
+      : subscription_(transport.subscribe<JointMessage>("/PSM1/servo_jp", [this](JointMessage&& message) {
           for (const double position : message.positions) finite_ = finite_ && std::isfinite(position);
           last_s_ = since_1970_s();
           ++count_;
@@ -372,15 +372,15 @@ class Dvrk : public ::testing::TestWithParam<std::string> {
     judge_ = std::make_unique<Judge>(*transport_);
     spy_ = std::make_unique<Spy>(*transport_);
     surgeon_ = std::make_unique<Teleoperation>(*transport_);
-    state_command_ = transport_->string_publisher("/PSM1/state_command");
-    move_jp_ = transport_->joint_publisher("/PSM1/move_jp");
-    servo_jp_ = transport_->joint_publisher("/PSM1/servo_jp");
-    servo_cp_ = transport_->place_publisher("/PSM1/servo_cp");
-    set_base_frame_ = transport_->place_publisher("/PSM1/set_base_frame");
-    ecm_servo_jp_ = transport_->joint_publisher("/ECM/servo_jp");
+    state_command_ = transport_->publisher<StringMessage>("/PSM1/state_command");
+    move_jp_ = transport_->publisher<JointMessage>("/PSM1/move_jp");
+    servo_jp_ = transport_->publisher<JointMessage>("/PSM1/servo_jp");
+    servo_cp_ = transport_->publisher<PlaceMessage>("/PSM1/servo_cp");
+    set_base_frame_ = transport_->publisher<PlaceMessage>("/PSM1/set_base_frame");
+    ecm_servo_jp_ = transport_->publisher<JointMessage>("/ECM/servo_jp");
     set_tool_type_ = text_publisher(GetParam(), "/PSM1/set_tool_type");
-    command_ = transport_->string_publisher("/lapservo/PSM1/command");
-    wish_ = transport_->joint_publisher("/lapservo/PSM1/set_point");
+    command_ = transport_->publisher<StringMessage>("/lapservo/PSM1/command");
+    wish_ = transport_->publisher<JointMessage>("/lapservo/PSM1/set_point");
     rig_ = testing::small_test_rig();
     endoscope_ = std::make_unique<EndoscopeOfTheArm>(*transport_, rig_, *judge_);
     testing::write_file("rig.yaml", rig_yaml(rig_));

@@ -50,8 +50,8 @@ class ArmResponse {
   void solve();
 
   Scales scales_;
-  Eigen::Vector4d q_before_ = Eigen::Vector4d::Zero(), velocity_ = Eigen::Vector4d::Zero(),
-                  smooth_velocity_ = velocity_, smooth_setpoint_velocity_ = velocity_;
+  Eigen::Vector4d q_before_ = Eigen::Vector4d::Zero(), smooth_velocity_ = q_before_,
+                  smooth_setpoint_velocity_ = q_before_;
   Eigen::Vector4d standing_load_ = Eigen::Vector4d::Zero();
   bool started_ = false, asked_ = false;
   // In joint scales.

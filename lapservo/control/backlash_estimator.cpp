@@ -7,24 +7,15 @@
 
 namespace lapservo::internal {
 
-BacklashEstimator::BacklashEstimator(const BacklashEstimatorConfig& config, const Scales& scales)
-    : config_(config), scales_(scales) {}
-
 void BacklashEstimator::follow(const Eigen::Vector4d& q_joint) {
-  if (!followed_) {
-    for (int i = 0; i < 4; ++i) {
-      Joint& joint = joints_[static_cast<std::size_t>(i)];
-      joint.pressed = false;
-      joint.lowest = joint.highest = q_joint[i];
-    }
-  }
+  for (int i = 0; i < 4; ++i) follow(i, q_joint[i]);
   followed_ = true;
   q_joint_ = q_joint;
-  for (int i = 0; i < 4; ++i) follow(i, q_joint[i]);
 }
 
 void BacklashEstimator::follow(int index, double measured) {
   Joint& joint = joints_[static_cast<std::size_t>(index)];
+  if (!followed_) joint.pressed = false, joint.lowest = joint.highest = measured;
   const double largest = config_.largest[index];
   if (!(largest > 0)) return;
   if (joint.pressed) {
@@ -38,10 +29,6 @@ void BacklashEstimator::follow(int index, double measured) {
   for (Candidate& candidate : joint.grid) candidate.backlash = Backlash(measured, side);
   joint.pressed = true;
   joint.since = 0;
-}
-
-void BacklashEstimator::interrupt() {
-  followed_ = false;
 }
 
 void BacklashEstimator::add(double time_s, const Eigen::Vector4d& rate, const Eigen::Vector4d& q_image,

@@ -27,7 +27,7 @@ class BacklashEstimator {
  public:
   static constexpr std::size_t candidates = 21;  ///< 0 to the largest
 
-  BacklashEstimator(const BacklashEstimatorConfig& config, const Scales& scales);
+  BacklashEstimator(const BacklashEstimatorConfig& config, const Scales& scales) : config_(config), scales_(scales) {}
 
   /// Measured joints, in order of time, up to those of the image in add().
   void follow(const Eigen::Vector4d& q_joint);
@@ -36,7 +36,7 @@ class BacklashEstimator {
   void add(double time_s, const Eigen::Vector4d& rate, const Eigen::Vector4d& q_image,
            const Eigen::Matrix4d& covariance);
   /// The offset jumped, or measured joints are missing: keeps what is known, but compares nothing across.
-  void interrupt();
+  void interrupt() { followed_ = false; }
 
   std::optional<BacklashEstimate> estimate(int joint) const;
 

@@ -26,7 +26,7 @@ void DelayEstimator::add(double stamp_s, const Eigen::Vector4d& q_image, const E
   if (history.size() == 0 || history.oldest_s() > stamp_s - span_s) return;
   const Eigen::Matrix4d noise = covariance + Eigen::Matrix4d(config_.measured_sigma.cwiseAbs2().asDiagonal());
   const Eigen::Matrix4d information = noise.inverse();
-  const double interval_s = started_ ? std::max(0.0, stamp_s - last_stamp_s_) : 0.0;
+  const double interval_s = weight_ > 0 ? std::max(0.0, stamp_s - last_stamp_s_) : 0.0;
   const double kept = std::exp(-interval_s / config_.forgetting_s);
   // A plain mean at first, a running one once the time constant has passed.
   const double fraction = std::max(1 / (1 + since_), -std::expm1(-interval_s / config_.offset_time_s));
@@ -51,7 +51,6 @@ void DelayEstimator::add(double stamp_s, const Eigen::Vector4d& q_image, const E
   since_ += 1;
   seen_s_ += interval_s;
   last_stamp_s_ = stamp_s;
-  started_ = true;
 }
 
 // The square of the delay's error by a wrong model, where it shows: each joint's place in the image may be off by a

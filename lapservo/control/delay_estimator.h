@@ -62,7 +62,6 @@ class DelayEstimator {
   /// Products of the joints' places in the image, for each pair of joints that may be off by them, forgotten likewise.
   Eigen::Matrix<double, 16, 16> by_model_ = Eigen::Matrix<double, 16, 16>::Zero();
   double information_per_s2_ = 0;  ///< that the joints' motion gives of a delay, forgotten likewise
-  bool started_ = false;
 };
 
 }  // namespace lapservo::internal

@@ -6,7 +6,6 @@
 
 #include "lapservo/control/newton_inverse.h"
 #include "lapservo/control/tracking_law.h"
-#include "lapservo/control/uncalibrated_estimator.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/core/error.h"
 
@@ -111,18 +110,6 @@ class LatestImageEstimator : public Estimator {
 
 }  // namespace
 
-void Estimator::set_model(const FeatureModel&) {}
-
-std::optional<Unanswered> Estimator::unanswered() const {
-  return std::nullopt;
-}
-
-std::optional<Eigen::Vector4d> Estimator::probing_velocity(double) const {
-  return std::nullopt;
-}
-
-void Estimator::advance_probing(double) {}
-
 std::unique_ptr<Estimator> make_estimator(const ControllerConfig& config, const FeatureModel& model) {
   if (!model && config.mode != ControlMode::uncalibrated)
     throw InputError("controller", "mode", std::string(to_string(config.mode)), "a model (camera_from_rcm in the rig)");
@@ -132,7 +119,7 @@ std::unique_ptr<Estimator> make_estimator(const ControllerConfig& config, const 
     case ControlMode::paper:
       return std::make_unique<LatestImageEstimator>(config, model);
     case ControlMode::uncalibrated:
-      return std::make_unique<UncalibratedEstimator>(config);
+      return make_uncalibrated_estimator(config);
   }
   return nullptr;
 }

@@ -34,10 +34,10 @@ class Estimator {
   virtual bool delay_is_known() const { return true; }
 
   /// The joint that a probing motion moved and no image showed, with HoldReason::image_not_following.
-  virtual std::optional<Unanswered> unanswered() const;
+  virtual std::optional<Unanswered> unanswered() const { return std::nullopt; }
 
   /// Another camera_from_rcm: the estimates of delay and backlash stay, the next image gives the instrument's place.
-  virtual void set_model(const FeatureModel& model);
+  virtual void set_model(const FeatureModel& /*model*/) {}
 
   /// The measured joints jumped: nothing is to be learnt across.
   virtual void interrupt() {}
@@ -49,12 +49,14 @@ class Estimator {
 
   /// The motion of the joints, `time_s` after the last advance_probing(), that it needs to see before it can estimate
   /// anything; nullopt when it needs none.
-  virtual std::optional<Eigen::Vector4d> probing_velocity(double time_s) const;
+  virtual std::optional<Eigen::Vector4d> probing_velocity(double /*time_s*/) const { return std::nullopt; }
   /// So much of that motion has been commanded.
-  virtual void advance_probing(double time_s);
+  virtual void advance_probing(double /*time_s*/) {}
 };
 
 /// `model` maps q to features; ControlMode::uncalibrated does without, the others throw InputError when it is empty.
 std::unique_ptr<Estimator> make_estimator(const ControllerConfig& config, const FeatureModel& model);
+/// That of ControlMode::uncalibrated.
+std::unique_ptr<Estimator> make_uncalibrated_estimator(const ControllerConfig& config);
 
 }  // namespace lapservo::internal

@@ -38,9 +38,7 @@ Eigen::Vector4d ImageResponse::unconfirmed_rate(const JointLimits& limits) {
 }
 
 ImageResponse::ImageResponse(const ControllerConfig& config)
-    : config_(config), backlash_(backlash_part * config.observer.backlash.largest.array()) {
-  restart();
-}
+    : config_(config), backlash_(backlash_part * config.observer.backlash.largest.array()) {}
 
 void ImageResponse::restart() {
   unanswered_.reset();

@@ -34,9 +34,8 @@ JacobianEstimator::Update JacobianEstimator::update(const Eigen::Vector4d& q_the
   innovation << feature_error(features, expected).cwiseQuotient(scales_.features),
       ends_px - parameters_.row(0).tail<4>().transpose();
   const double variance = covariance_(0, 0) + config_.noise * config_.noise;
-  if (innovation.head<4>().squaredNorm() > config_.gate_chi2 * variance && ++outliers_ < config_.reacquire_after) {
+  if (innovation.head<4>().squaredNorm() > config_.gate_chi2 * variance && ++outliers_ < config_.reacquire_after)
     return Update::outlier;
-  }
   if (outliers_ >= config_.reacquire_after) {
     // Elsewhere than thought: what is known of G stays, y0 starts anew.
     parameters_.row(0) += innovation.transpose();

@@ -2,7 +2,6 @@
 
 #include <Eigen/Core>
 
-#include "lapservo/control/affine_fit.h"
 #include "lapservo/control/controller_config.h"
 #include "lapservo/control/feature_model.h"
 #include "lapservo/control/probing.h"

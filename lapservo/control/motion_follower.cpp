@@ -23,10 +23,6 @@ MotionFollower::MotionFollower(JointMotion motion, const JointLimits& limits, co
   path_.reset(now_s, motion_.at(0));
 }
 
-bool MotionFollower::is_far(const Eigen::Vector4d& a, const Eigen::Vector4d& b) const {
-  return !((a - b).cwiseAbs().array() <= max_lead_.array()).all();
-}
-
 MotionFollower::Step MotionFollower::send(double now_s, const Eigen::Vector4d& wanted_velocity) {
   const Eigen::Matrix4d weight = limits_.rate.cwiseAbs2().cwiseInverse().asDiagonal();
   const LimitedVelocity allowed =
@@ -53,7 +49,7 @@ MotionFollower::Step MotionFollower::step(double now_s, const JointVector& measu
   const double t = now_s - started_s_;
   if (t > motion_.duration_s + period_s) return {Progress::done};
   const Eigen::Vector4d on_path = path_.at(now_s).position;
-  far_ = is_far(q, on_path) ? far_ + 1 : 0;
+  far_ = ((q - on_path).cwiseAbs().array() <= max_lead_.array()).all() ? 0 : far_ + 1;
   if (far_ >= far_after && q.allFinite()) {
     retreat_ = Retreat{q, now_s + retreats_for_s};
     return retreat(now_s);

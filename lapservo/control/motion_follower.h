@@ -34,7 +34,6 @@ class MotionFollower {
 
  private:
   Step retreat(double now_s);
-  bool is_far(const Eigen::Vector4d& a, const Eigen::Vector4d& b) const;
   Step send(double now_s, const Eigen::Vector4d& wanted_velocity);
 
   JointMotion motion_;

@@ -5,7 +5,8 @@
 namespace lapservo::internal {
 
 std::optional<NewtonInverse> newton_inverse(const FeatureModel& model, const Eigen::Vector4d& target,
-                                            const Eigen::Vector4d& guess, const Scales& scales, int max_iterations) {
+                                            const Eigen::Vector4d& guess, const Scales& scales) {
+  constexpr int max_iterations = 30;
   constexpr double tolerance = 1e-6;  // in feature scales
   constexpr double longest_step = 2;  // in joint scales: stay where the linear model means something
   constexpr double shortest_step = 1e-3;
@@ -14,9 +15,9 @@ std::optional<NewtonInverse> newton_inverse(const FeatureModel& model, const Eig
   const auto size = [&](const Eigen::Vector4d& residual) { return residual.cwiseQuotient(scales.features).norm(); };
 
   NewtonInverse best{guess, feature_error(target, state->features), false};
-  for (int iteration = 0; iteration < max_iterations; ++iteration) {
+  for (int iteration = 0;; ++iteration) {
     best.converged = size(best.residual) < tolerance;
-    if (best.converged) return best;
+    if (best.converged || iteration == max_iterations) return best;
     Eigen::Vector4d step = damped_inverse(state->jacobian, scales).inverse * best.residual;
     const double length = step.cwiseQuotient(scales.joints).norm();
     if (length > longest_step) step *= longest_step / length;
@@ -33,8 +34,6 @@ std::optional<NewtonInverse> newton_inverse(const FeatureModel& model, const Eig
       break;
     }
   }
-  best.converged = size(best.residual) < tolerance;
-  return best;
 }
 
 }  // namespace lapservo::internal

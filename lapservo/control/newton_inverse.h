@@ -19,7 +19,6 @@ struct NewtonInverse {
 
 /// Damped Newton's method with step halving, from `guess`. nullopt when the model sees nothing at the guess.
 std::optional<NewtonInverse> newton_inverse(const FeatureModel& model, const Eigen::Vector4d& target,
-                                            const Eigen::Vector4d& guess, const Scales& scales,
-                                            int max_iterations = 30);
+                                            const Eigen::Vector4d& guess, const Scales& scales);
 
 }  // namespace lapservo::internal

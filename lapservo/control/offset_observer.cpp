@@ -50,9 +50,8 @@ Eigen::Vector4d OffsetObserver::walk_variance(double interval_s, const Eigen::Ve
 
 Update OffsetObserver::update(const FeatureModel& model, const JointHistory& history, const ImageMeasurement& image) {
   if (!image.features.allFinite() || !image.covariance.allFinite() || !image.ends_px.allFinite() ||
-      !std::isfinite(image.time_s) || (image.q && !image.q->allFinite())) {
+      !std::isfinite(image.time_s) || (image.q && !image.q->allFinite()))
     return Update::non_finite;
-  }
   const auto q_then = history.at(image.time_s - delay_s_);
   if (!q_then) return Update::no_history;
   follow_measured(history, image.time_s - delay_s_, *q_then);
@@ -103,9 +102,8 @@ Update OffsetObserver::update(const FeatureModel& model, const JointHistory& his
 }
 
 void OffsetObserver::follow_measured(const JointHistory& history, double time_s, const Eigen::Vector4d& q_then) {
-  if (!started_) {
+  if (!started_)
     for (int i = 0; i < 4; ++i) backlashes_then_[static_cast<std::size_t>(i)] = Backlash(q_then[i]);
-  }
   const auto follow_all = [this](const Eigen::Vector4d& q) {
     follow(backlashes_then_, q, backlash_);
     backlash_estimator_.follow(q);

@@ -40,10 +40,11 @@ enum class Update {
 class OffsetObserver {
  public:
   OffsetObserver(const ObserverConfig& config, const Scales& scales)
-      : config_(config), scales_(scales), backlash_estimator_(config.backlash, scales) {
-    delay_s_ = config.delay_s.value_or(config.initial_delay_s);
-    delay_estimator_ = DelayEstimator(config.delay_estimator);
-  }
+      : config_(config),
+        scales_(scales),
+        delay_estimator_(config.delay_estimator),
+        backlash_estimator_(config.backlash, scales),
+        delay_s_(config.delay_s.value_or(config.initial_delay_s)) {}
 
   Update update(const FeatureModel& model, const JointHistory& history, const ImageMeasurement& image);
 
@@ -87,7 +88,7 @@ class OffsetObserver {
   Eigen::Vector4d backlash_ = Eigen::Vector4d::Zero();
   Backlashes backlashes_then_, backlashes_;  ///< at the last image, at the last reading before it came
   double followed_s_ = 0;                    ///< the time of backlashes_then_
-  double delay_s_ = 0;
+  double delay_s_;
   bool delay_seen_ = false;
   bool started_ = false;
   bool anew_ = false;                                         ///< the offset belongs to another model

@@ -10,31 +10,30 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/core/csv.h"
 #include "lapservo/core/error.h"
+#include "lapservo/core/joint_vector.h"
 #include "lapservo/core/minimum_jerk.h"
 
 namespace lapservo {
 using namespace internal;
 namespace {
 
-constexpr std::array<const char*, 4> feature_names{"s_rad", "r_px", "l_px", "d_px"};
+void require(const char* what, const Eigen::Vector4d& values, bool (*good)(double), const char* expected) {
+  for (int i = 0; i < 4; ++i)
+    if (!good(values[i]))
+      throw InputError("trajectory",
+                       std::string(what) + "." + std::string(FeatureVector::names[static_cast<std::size_t>(i)]),
+                       std::to_string(values[i]), expected);
+}
 
 void require_finite_features(const char* what, const Eigen::Vector4d& values) {
-  for (int i = 0; i < 4; ++i) {
-    if (!std::isfinite(values[i])) {
-      throw InputError("trajectory", std::string(what) + "." + feature_names[static_cast<std::size_t>(i)],
-                       std::to_string(values[i]), "a finite number");
-    }
-  }
+  require(
+      what, values, [](double value) { return std::isfinite(value); }, "a finite number");
 }
 
 void require_positive_features(const char* what, const Eigen::Vector4d& values) {
   require_finite_features(what, values);
-  for (int i = 0; i < 4; ++i) {
-    if (!(values[i] > 0)) {
-      throw InputError("trajectory", std::string(what) + "." + feature_names[static_cast<std::size_t>(i)],
-                       std::to_string(values[i]), "a number above 0");
-    }
-  }
+  require(
+      what, values, [](double value) { return value > 0; }, "a number above 0");
 }
 
 /// Rests before `start` and after `end` of what it is given.
@@ -129,11 +128,9 @@ Trajectory from_table(const CsvTable& table, const std::string& source) {
   std::vector<double> times_s;
   std::vector<Eigen::Vector4d> values;
   for (std::size_t row = 0; row < table.rows(); ++row) {
-    const double time_s = table.number(row, "time_s");
-    Eigen::Vector4d value;
-    for (int i = 0; i < 4; ++i) value[i] = table.number(row, feature_names[static_cast<std::size_t>(i)]);
-    times_s.push_back(time_s);
-    values.push_back(value);
+    times_s.push_back(table.number(row, "time_s"));
+    Eigen::Vector4d& value = values.emplace_back();
+    for (int i = 0; i < 4; ++i) value[i] = table.number(row, FeatureVector::names[static_cast<std::size_t>(i)]);
   }
   return trajectory_through(std::move(times_s), std::move(values), source);
 }

@@ -1,8 +1,12 @@
-#include "lapservo/control/uncalibrated_estimator.h"
-
 #include <algorithm>
+#include <memory>
+#include <optional>
+#include <variant>
 
+#include "lapservo/control/estimator.h"
 #include "lapservo/control/image_response.h"
+#include "lapservo/control/jacobian_estimator.h"
+#include "lapservo/control/probing.h"
 #include "lapservo/core/angles.h"
 
 namespace lapservo::internal {
@@ -20,113 +24,143 @@ Eigen::Index joint_at(const ProbingConfig& config, double probed_s) {
   return std::min<Eigen::Index>(4, static_cast<Eigen::Index>(probed_s / config.joint_time_s));
 }
 
+// Without a model: a small probing motion gives the Jacobian and the delay, and JacobianEstimator keeps learning.
+class UncalibratedEstimator : public Estimator {
+ public:
+  explicit UncalibratedEstimator(const ControllerConfig& config) : config_(config) {}
+
+  HoldReason update(const ImageMeasurement& image, const JointHistory& history) override {
+    if (auto* learnt = std::get_if<Learnt>(&state_)) return follow(*learnt, image, history);
+    if (std::holds_alternative<Waiting>(state_))
+      state_ = Probing{
+          ProbingMotion(config_.probing, config_.limits, *history.newest(), side_),
+          ProbingFit(config_.scales, config_.observer.delay_s),
+          ProbingResponse(ImageResponse::longest_path(), config_.observer.delay_s.value_or(ProbingFit::longest_s))};
+    return learn(std::get<Probing>(state_), image, history);
+  }
+  std::optional<Estimate> at(double, const Eigen::Vector4d& q_joint) const override {
+    const auto* learnt = std::get_if<Learnt>(&state_);
+    if (!learnt) return std::nullopt;
+    const FeatureState state = learnt->jacobian.at(q_joint);
+    Estimate now;
+    now.q = q_joint;
+    now.features = state.features;
+    now.covariance = config_.scales.features.cwiseAbs2().asDiagonal();
+    now.covariance *= learnt->jacobian.variance_at(q_joint);
+    now.jacobian = state.jacobian;
+    now.ends_px = state.ends_px;
+    now.ends_jacobian = state.ends_jacobian;
+    return now;
+  }
+  double delay_s() const override {
+    if (config_.observer.delay_s) return *config_.observer.delay_s;
+    const auto* learnt = std::get_if<Learnt>(&state_);
+    return learnt ? learnt->delay_s : 0;
+  }
+  std::optional<Eigen::Vector4d> probing_velocity(double time_s) const override {
+    const auto* probing = std::get_if<Probing>(&state_);
+    if (!probing) return std::nullopt;
+    return probing->pace * probing->motion.velocity(probing->probed_s + probing->pace * time_s);
+  }
+  void advance_probing(double time_s) override {
+    constexpr double faster_per_s = 10;
+    auto* probing = std::get_if<Probing>(&state_);
+    if (!probing) return;
+    probing->probed_s += probing->pace * time_s;
+    probing->pace = std::min(probing->pace + faster_per_s * time_s, pace_of(*probing));
+  }
+  std::optional<Unanswered> unanswered() const override { return unanswered_; }
+  void interrupt() override { restart_probing(); }
+  void restart_probing() override {
+    if (std::holds_alternative<Probing>(state_)) state_ = Waiting{};
+  }
+
+ private:
+  /// For an image, by which the probing motion begins.
+  struct Waiting {};
+  struct Probing {
+    ProbingMotion motion;
+    ProbingFit fit;
+    ProbingResponse response;
+    double probed_s = 0;
+    double pace = 0;                ///< of the motion: slower until an image shows the joint's
+    Eigen::Index joint = -1;        ///< that is probed
+    double beyond_at_first_px = 0;  ///< of the window, in the first image of that joint's motion
+  };
+  struct Learnt {
+    JacobianEstimator jacobian;
+    double delay_s;
+    double last_image_s;  ///< stamp of the last one used
+  };
+
+  HoldReason learn(Probing& probing, const ImageMeasurement& image, const JointHistory& history) {
+    unanswered_.reset();
+    if (!is_answered(probing, image, history)) {
+      state_ = Waiting{};
+      return HoldReason::image_not_following;
+    }
+    if (config_.window) stay_inside(probing, *config_.window, image.ends_px);
+    probing.fit.add(image.time_s, image.features, image.ends_px, history);
+    if (probing.probed_s < probing.motion.duration_s()) return HoldReason::none;
+    const auto model = probing.fit.solve();
+    if (!model) {
+      state_ = Waiting{};
+      return HoldReason::not_learnt;
+    }
+    Learnt learnt{JacobianEstimator(config_.jacobian, config_.scales), model->delay_s, image.time_s};
+    learnt.jacobian.start(*model);
+    state_ = learnt;
+    return HoldReason::none;
+  }
+  // Nothing is known yet of what a joint does in the image, but one that takes the marker out of the window has to go
+  // back, and to the other side next time. It may begin outside, where the one before has left the marker.
+  void stay_inside(Probing& probing, const ImageWindow& window, const Eigen::Vector4d& ends_px) {
+    constexpr double noise_px = 1;
+    const double beyond = beyond_px(window, ends_px), back_s = probing.motion.way_back_s(probing.probed_s);
+    const Eigen::Index joint = joint_at(config_.probing, probing.probed_s);
+    if (joint > 3) return;
+    if (joint != probing.joint || probing.response.waits(joint)) probing.beyond_at_first_px = beyond;
+    probing.joint = joint;
+    if (back_s == probing.probed_s || beyond < probing.beyond_at_first_px + noise_px) return;
+    side_[joint] = -side_[joint];
+    probing.probed_s = back_s;
+  }
+  bool is_answered(Probing& probing, const ImageMeasurement& image, const JointHistory& history) {
+    const Eigen::Index joint = joint_at(config_.probing, probing.probed_s);
+    if (joint > 3) return true;
+    probing.response.add(joint, image, history);
+    if (probing.response.is_unanswered()) unanswered_ = Unanswered{joint, 0};
+    return !unanswered_;
+  }
+  // The largest speed is that of a joint that no image has answered.
+  double pace_of(const Probing& probing) const {
+    const Eigen::Index joint = joint_at(config_.probing, probing.probed_s);
+    if (joint > 3 || probing.response.answers(joint)) return 1;
+    if (probing.response.waits(joint)) return 0;
+    const double largest = config_.probing.distance[joint] * pi / config_.probing.joint_time_s;
+    return std::min(1.0, ImageResponse::unconfirmed_rate(config_.limits)[joint] / largest);
+  }
+  HoldReason follow(Learnt& learnt, const ImageMeasurement& image, const JointHistory& history) const {
+    const auto q_then = history.at(image.time_s - delay_s());
+    if (!q_then) return HoldReason::no_history;
+    const double interval_s = std::max(0.0, image.time_s - learnt.last_image_s);
+    if (learnt.jacobian.update(*q_then, image.features, image.ends_px, interval_s) !=
+        JacobianEstimator::Update::accepted)
+      return HoldReason::outlier;
+    learnt.last_image_s = image.time_s;
+    return HoldReason::none;
+  }
+
+  ControllerConfig config_;
+  Eigen::Vector4d side_ = Eigen::Vector4d::Ones();  ///< to which the joints are probed
+  std::variant<Waiting, Probing, Learnt> state_;
+  std::optional<Unanswered> unanswered_;
+};
+
 }  // namespace
 
-HoldReason UncalibratedEstimator::update(const ImageMeasurement& image, const JointHistory& history) {
-  if (auto* learnt = std::get_if<Learnt>(&state_)) return follow(*learnt, image, history);
-  if (std::holds_alternative<Waiting>(state_))
-    state_ = Probing{
-        ProbingMotion(config_.probing, config_.limits, *history.newest(), side_),
-        ProbingFit(config_.scales, config_.observer.delay_s),
-        ProbingResponse(ImageResponse::longest_path(), config_.observer.delay_s.value_or(ProbingFit::longest_s))};
-  return learn(std::get<Probing>(state_), image, history);
-}
-
-HoldReason UncalibratedEstimator::learn(Probing& probing, const ImageMeasurement& image, const JointHistory& history) {
-  unanswered_.reset();
-  if (!is_answered(probing, image, history)) {
-    state_ = Waiting{};
-    return HoldReason::image_not_following;
-  }
-  if (config_.window) stay_inside(probing, *config_.window, image.ends_px);
-  probing.fit.add(image.time_s, image.features, image.ends_px, history);
-  if (probing.probed_s < probing.motion.duration_s()) return HoldReason::none;
-  const auto model = probing.fit.solve();
-  if (!model) {
-    state_ = Waiting{};
-    return HoldReason::not_learnt;
-  }
-  Learnt learnt{JacobianEstimator(config_.jacobian, config_.scales), model->delay_s, image.time_s};
-  learnt.jacobian.start(*model);
-  state_ = learnt;
-  return HoldReason::none;
-}
-
-// Nothing is known yet of what a joint does in the image, but one that takes the marker out of the window has to go
-// back, and to the other side next time. It may begin outside, where the one before has left the marker.
-void UncalibratedEstimator::stay_inside(Probing& probing, const ImageWindow& window, const Eigen::Vector4d& ends_px) {
-  constexpr double noise_px = 1;
-  const double beyond = beyond_px(window, ends_px), back_s = probing.motion.way_back_s(probing.probed_s);
-  const Eigen::Index joint = joint_at(config_.probing, probing.probed_s);
-  if (joint > 3) return;
-  if (joint != probing.joint || probing.response.waits(joint)) probing.beyond_at_first_px = beyond;
-  probing.joint = joint;
-  if (back_s == probing.probed_s || beyond < probing.beyond_at_first_px + noise_px) return;
-  side_[joint] = -side_[joint];
-  probing.probed_s = back_s;
-}
-
-HoldReason UncalibratedEstimator::follow(Learnt& learnt, const ImageMeasurement& image,
-                                         const JointHistory& history) const {
-  const auto q_then = history.at(image.time_s - delay_s());
-  if (!q_then) return HoldReason::no_history;
-  const double interval_s = std::max(0.0, image.time_s - learnt.last_image_s);
-  if (learnt.jacobian.update(*q_then, image.features, image.ends_px, interval_s) != JacobianEstimator::Update::accepted)
-    return HoldReason::outlier;
-  learnt.last_image_s = image.time_s;
-  return HoldReason::none;
-}
-
-double UncalibratedEstimator::delay_s() const {
-  if (config_.observer.delay_s) return *config_.observer.delay_s;
-  const auto* learnt = std::get_if<Learnt>(&state_);
-  return learnt ? learnt->delay_s : 0;
-}
-
-std::optional<Eigen::Vector4d> UncalibratedEstimator::probing_velocity(double time_s) const {
-  const auto* probing = std::get_if<Probing>(&state_);
-  if (!probing) return std::nullopt;
-  return probing->pace * probing->motion.velocity(probing->probed_s + probing->pace * time_s);
-}
-
-// The largest speed is that of a joint that no image has answered.
-double UncalibratedEstimator::pace_of(const Probing& probing) const {
-  const Eigen::Index joint = joint_at(config_.probing, probing.probed_s);
-  if (joint > 3 || probing.response.answers(joint)) return 1;
-  if (probing.response.waits(joint)) return 0;
-  const double largest = config_.probing.distance[joint] * pi / config_.probing.joint_time_s;
-  return std::min(1.0, ImageResponse::unconfirmed_rate(config_.limits)[joint] / largest);
-}
-
-void UncalibratedEstimator::advance_probing(double time_s) {
-  constexpr double faster_per_s = 10;
-  auto* probing = std::get_if<Probing>(&state_);
-  if (!probing) return;
-  probing->probed_s += probing->pace * time_s;
-  probing->pace = std::min(probing->pace + faster_per_s * time_s, pace_of(*probing));
-}
-
-bool UncalibratedEstimator::is_answered(Probing& probing, const ImageMeasurement& image, const JointHistory& history) {
-  const Eigen::Index joint = joint_at(config_.probing, probing.probed_s);
-  if (joint > 3) return true;
-  probing.response.add(joint, image, history);
-  if (probing.response.is_unanswered()) unanswered_ = Unanswered{joint, 0};
-  return !unanswered_;
-}
-
-std::optional<Estimate> UncalibratedEstimator::at(double, const Eigen::Vector4d& q_joint) const {
-  const auto* learnt = std::get_if<Learnt>(&state_);
-  if (!learnt) return std::nullopt;
-  const FeatureState state = learnt->jacobian.at(q_joint);
-  Estimate now;
-  now.q = q_joint;
-  now.features = state.features;
-  now.covariance = config_.scales.features.cwiseAbs2().asDiagonal();
-  now.covariance *= learnt->jacobian.variance_at(q_joint);
-  now.jacobian = state.jacobian;
-  now.ends_px = state.ends_px;
-  now.ends_jacobian = state.ends_jacobian;
-  return now;
+std::unique_ptr<Estimator> make_uncalibrated_estimator(const ControllerConfig& config) {
+  return std::make_unique<UncalibratedEstimator>(config);
 }
 
 }  // namespace lapservo::internal

@@ -5,39 +5,25 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 
+#include "lapservo/core/inplace_vector.h"
+
 namespace lapservo::internal {
 namespace {
 
 using UpTo4 = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 4, 1>;
 using Gram = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 4, 4>;
 
-struct WorkingSet {
-  std::array<std::size_t, 4> index{};
-  int size = 0;
-
-  bool contains(std::size_t i) const {
-    for (int k = 0; k < size; ++k) {
-      if (index[static_cast<std::size_t>(k)] == i) return true;
-    }
-    return false;
-  }
-  void add(std::size_t i) { index[static_cast<std::size_t>(size++)] = i; }
-  void remove(int k) {
-    for (int j = k; j + 1 < size; ++j) index[static_cast<std::size_t>(j)] = index[static_cast<std::size_t>(j + 1)];
-    --size;
-  }
-  std::size_t operator[](int k) const { return index[static_cast<std::size_t>(k)]; }
-};
+using WorkingSet = InplaceVector<std::size_t, 4>;
 
 /// mu of the minimiser y = N mu over the working set.
 UpTo4 minimiser(const HalfSpaces& limits, const WorkingSet& working) {
-  Gram gram(working.size, working.size);
-  UpTo4 bounds(working.size);
-  for (int i = 0; i < working.size; ++i) {
+  const auto size = static_cast<Eigen::Index>(working.size());
+  Gram gram(size, size);
+  UpTo4 bounds(size);
+  for (std::size_t i = 0; i < working.size(); ++i) {
     bounds[i] = limits.items[working[i]].bound;
-    for (int j = 0; j < working.size; ++j) {
+    for (std::size_t j = 0; j < working.size(); ++j)
       gram(i, j) = limits.items[working[i]].normal.dot(limits.items[working[j]].normal);
-    }
   }
   return gram.ldlt().solve(bounds);
 }
@@ -68,7 +54,7 @@ QpSolution solve_velocity_qp(const Eigen::Matrix4d& weight, const Eigen::Vector4
     std::size_t blocking = in_y.size;
     for (std::size_t i = 0; i < in_y.size; ++i) {
       const double outward = in_y.items[i].normal.dot(step);
-      if (!(outward > tolerance) || working.contains(i)) continue;
+      if (!(outward > tolerance) || std::find(working.begin(), working.end(), i) != working.end()) continue;
       const double room = std::max(0.0, in_y.items[i].bound - in_y.items[i].normal.dot(y));
       if (room < fraction * outward) {
         fraction = room / outward;
@@ -77,27 +63,23 @@ QpSolution solve_velocity_qp(const Eigen::Matrix4d& weight, const Eigen::Vector4
     }
     y += fraction * step;
     if (blocking == in_y.size) return true;
-    working.add(blocking);
+    working.push_back(blocking);
     return false;
   };
 
   for (int iteration = 0; iteration < max_iterations && !solution.optimal; ++iteration) {
     const UpTo4 mu = minimiser(in_y, working);
     Eigen::Vector4d target = Eigen::Vector4d::Zero();
-    for (int k = 0; k < working.size; ++k) target += mu[k] * in_y.items[working[k]].normal;
+    for (std::size_t k = 0; k < working.size(); ++k) target += mu[k] * in_y.items[working[k]].normal;
     // Four active half-spaces fix a point: y is it.
-    if (working.size < 4 && !advance(target)) continue;
-    int released = -1;
-    for (int k = 0; k < working.size; ++k) {
-      if (mu[k] > tolerance && (released < 0 || working[k] < working[released])) released = k;
-    }
-    if (released < 0) {
-      solution.optimal = true;
-    } else {
-      working.remove(released);
-    }
+    if (working.size() < 4 && !advance(target)) continue;
+    auto* released = working.end();
+    for (auto* k = working.begin(); k != working.end(); ++k)
+      if (mu[k - working.begin()] > tolerance && (released == working.end() || *k < *released)) released = k;
+    solution.optimal = released == working.end();
+    if (!solution.optimal) std::copy(released + 1, working.end(), released), working.pop_back();
   }
-  solution.constrained = working.size > 0;
+  solution.constrained = !working.empty();
   solution.x = wanted + cholesky.matrixU().solve(y);
   if (solution.optimal && !solution.constrained) solution.x = wanted;
   return solution;

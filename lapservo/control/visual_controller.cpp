@@ -31,6 +31,12 @@ bool all_finite(const ImageMeasurement& image) {
            image.camera_from_marker->rotation.coeffs().allFinite() && image.ends_px.allFinite()));
 }
 
+// Slower along the same line, so that a far goal is approached straight.
+Eigen::Vector4d slow_to_rate(const Eigen::Vector4d& velocity, const Eigen::Vector4d& rate) {
+  const double times = velocity.cwiseAbs().cwiseQuotient(rate).maxCoeff();
+  return times > 1 ? Eigen::Vector4d(velocity / times) : velocity;
+}
+
 }  // namespace
 
 VisualController::VisualController(const ControllerConfig& config, FeatureModel model)
@@ -221,37 +227,25 @@ HoldReason VisualController::by_their_rate(HoldReason reason) const {
 
 VisualController::Law VisualController::decide(HoldReason reason, const std::optional<Estimate>& estimate,
                                                const DesiredFeatures& desired) const {
-  Law law;
-  law.reason = reason == HoldReason::none ? suspended_ : reason;
-  if (law.reason != HoldReason::none) return law;
+  if (reason != HoldReason::none || suspended_ != HoldReason::none)
+    return {.reason = reason == HoldReason::none ? suspended_ : reason};
   const auto probing_velocity = estimator_->probing_velocity(config_.period_s);
-  law = probing_velocity ? probing_law(*probing_velocity) : tracking_law(estimate, desired);
+  Law law = probing_velocity ? Law{.action = ControlAction::probe,
+                                   .velocity = *probing_velocity,
+                                   .rate = config_.limits.rate,
+                                   .weight = config_.scales.joints.cwiseAbs2().cwiseInverse().asDiagonal()}
+                             : tracking_law(estimate, desired);
   if (!law.velocity.allFinite() || !law.weight.allFinite()) law.reason = HoldReason::non_finite;
-  return law;
-}
-
-VisualController::Law VisualController::probing_law(const Eigen::Vector4d& velocity) const {
-  Law law;
-  law.action = ControlAction::probe;
-  law.velocity = velocity;
-  law.rate = config_.limits.rate;
-  law.weight = config_.scales.joints.cwiseAbs2().cwiseInverse().asDiagonal();
   return law;
 }
 
 VisualController::Law VisualController::tracking_law(const std::optional<Estimate>& estimate,
                                                      const DesiredFeatures& desired) const {
+  if (!estimate) return {.reason = HoldReason::not_modelled};
+  const DampedInverse damped = damped_inverse(estimate->jacobian, config_.scales, config_.damping_threshold);
+  if (!(damped.min_singular_value >= config_.min_singular_value)) return {.reason = HoldReason::singular};
   Law law;
   law.rate = image_response_.rate();
-  if (!estimate) {
-    law.reason = HoldReason::not_modelled;
-    return law;
-  }
-  const DampedInverse damped = damped_inverse(estimate->jacobian, config_.scales, config_.damping_threshold);
-  if (!(damped.min_singular_value >= config_.min_singular_value)) {
-    law.reason = HoldReason::singular;
-    return law;
-  }
   law.weight = deviation_weight(estimate->jacobian);
   if (config_.mode == ControlMode::paper) {
     law.velocity =
@@ -310,12 +304,6 @@ Eigen::Matrix4d VisualController::deviation_weight(const Eigen::Matrix4d& jacobi
   const Eigen::Matrix4d scaled = config_.scales.features.cwiseInverse().asDiagonal() * jacobian;
   const Eigen::Matrix4d by_joints = config_.scales.joints.cwiseAbs2().cwiseInverse().asDiagonal();
   return scaled.transpose() * scaled + by_joints;
-}
-
-/// Slower along the same line, so that a far goal is approached straight.
-Eigen::Vector4d VisualController::slow_to_rate(const Eigen::Vector4d& velocity, const Eigen::Vector4d& rate) {
-  const double times = velocity.cwiseAbs().cwiseQuotient(rate).maxCoeff();
-  return times > 1 ? Eigen::Vector4d(velocity / times) : velocity;
 }
 
 }  // namespace lapservo::internal

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <bitset>
+#include <cstddef>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -20,13 +22,30 @@
 #include "lapservo/control/image_measurement.h"
 #include "lapservo/control/image_response.h"
 #include "lapservo/control/joint_history.h"
-#include "lapservo/control/slow_images.h"
 #include "lapservo/control/trajectory.h"
 #include "lapservo/control/wild_joints.h"
 #include "lapservo/robot/joint_path.h"
 #include "lapservo/robot/robot.h"
 
 namespace lapservo::internal {
+
+/// Whether images usually come too seldom: more than half of the latest ones came after the loop had held for the age
+/// of the one before. Pauses between images that are often enough are not that.
+class SlowImages {
+ public:
+  /// A usable image; `late`: the one before was too old already.
+  void add(bool late) {
+    latest_ = latest_ << 1;
+    latest_[0] = late;
+    slow_ = latest_.count() >= (slow_ ? few_ : many_);
+  }
+  bool are_slow() const { return slow_; }
+
+ private:
+  static constexpr std::size_t many_ = 6, few_ = 3;  // of the latest; slow until fewer than these
+  std::bitset<8> latest_;
+  bool slow_ = false;
+};
 
 /// The visual servo controller: measured joints, images and desired features in, joint velocities and setpoints out.
 /// One call a period; no allocation in it; every number that leaves is finite; setpoints never leave the joint limits
@@ -99,12 +118,10 @@ class VisualController {
   HoldReason by_their_rate(HoldReason reason) const;
   void watch_error(const DesiredFeatures& desired, const ControlStep& step);
   Law decide(HoldReason reason, const std::optional<Estimate>& estimate, const DesiredFeatures& desired) const;
-  Law probing_law(const Eigen::Vector4d& velocity) const;
   Law tracking_law(const std::optional<Estimate>& estimate, const DesiredFeatures& desired) const;
   void limit(const Law& law, const Eigen::Vector4d& q_joint, ControlStep& step) const;
   Eigen::Vector4d limited_hold(const Eigen::Vector4d& braking) const;
   Eigen::Matrix4d deviation_weight(const Eigen::Matrix4d& jacobian) const;
-  static Eigen::Vector4d slow_to_rate(const Eigen::Vector4d& velocity, const Eigen::Vector4d& rate);
 
   ControllerConfig config_;
   TrackingGains exact_gains_;

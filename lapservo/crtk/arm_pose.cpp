@@ -23,12 +23,8 @@ Rigid3 between(const Rigid3& from, const Rigid3& to, double share) {
 ArmPose::ArmPose(Transport& transport, const std::string& arm, const Clock& clock) : clock_(clock), stamps_(late_s) {
   for (const bool local : {true, false})
     subscriptions_.push_back(
-        transport.subscribe_places(topic_of(arm, local ? "local/measured_cp" : "measured_cp"),
-                                   [this, local](PlaceMessage&& message) { take(message, local); }));
-}
-
-ArmPose::~ArmPose() {
-  subscriptions_.clear();
+        transport.subscribe<PlaceMessage>(topic_of(arm, local ? "local/measured_cp" : "measured_cp"),
+                                          [this, local](PlaceMessage&& message) { take(message, local); }));
 }
 
 void ArmPose::take(const PlaceMessage& message, bool local) {

@@ -22,7 +22,6 @@ class ArmPose {
  public:
   /// `arm`: as in CrtkRobot. The transport and the clock must outlive it.
   ArmPose(Transport& transport, const std::string& arm, const Clock& clock);
-  ~ArmPose();
 
   /// nullopt while none has come, or the topic may change.
   std::optional<Rigid3> newest() const;

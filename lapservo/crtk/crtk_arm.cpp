@@ -1,38 +1,33 @@
 #include "lapservo/crtk/crtk_arm.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
 
 #include "lapservo/core/error.h"
 #include "lapservo/crtk/crtk_robot.h"
+#include "lapservo/crtk/joint_map.h"
 
 namespace lapservo::internal {
 
 CrtkArm::CrtkArm(Transport& transport, const std::string& arm, std::vector<std::string> names)
     : transport_(transport),
       names_(std::move(names)),
-      measured_js_(transport.joint_publisher(topic_of(arm, "measured_js"))),
-      setpoint_js_(transport.joint_publisher(topic_of(arm, "setpoint_js"))),
-      operating_state_(transport.operating_state_publisher(topic_of(arm, "operating_state"))) {
-  subscriptions_.push_back(transport.subscribe_joints(topic_of(arm, "servo_jp"),
-                                                      [this](JointMessage&& message) { take(std::move(message)); }));
-  subscriptions_.push_back(transport.subscribe_strings(topic_of(arm, "state_command"), [this](StringMessage&& command) {
-    const std::lock_guard lock(mutex_);
-    commands_.push_back(std::move(command.text));
-  }));
-}
-
-CrtkArm::~CrtkArm() {
-  subscriptions_.clear();
+      measured_js_(transport.publisher<JointMessage>(topic_of(arm, "measured_js"))),
+      setpoint_js_(transport.publisher<JointMessage>(topic_of(arm, "setpoint_js"))),
+      operating_state_(transport.publisher<OperatingStateMessage>(topic_of(arm, "operating_state"))) {
+  subscriptions_.push_back(transport.subscribe<JointMessage>(
+      topic_of(arm, "servo_jp"), [this](JointMessage&& message) { take(std::move(message)); }));
+  subscriptions_.push_back(
+      transport.subscribe<StringMessage>(topic_of(arm, "state_command"), [this](StringMessage&& command) {
+        const std::lock_guard lock(mutex_);
+        commands_.push_back(std::move(command.text));
+      }));
 }
 
 void CrtkArm::take(JointMessage&& message) {
   const bool is_whole = message.positions.size() == names_.size() &&
-                        (message.names.empty() || message.names == names_) &&
-                        std::all_of(message.positions.begin(), message.positions.end(),
-                                    [](double position) { return std::isfinite(position); });
+                        (message.names.empty() || message.names == names_) && all_finite(message.positions);
   const std::lock_guard lock(mutex_);
   if (is_whole) {
     setpoint_ = std::move(message.positions);

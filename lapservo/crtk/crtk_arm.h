@@ -16,7 +16,6 @@ class CrtkArm {
  public:
   /// `arm`: the namespace, for example PSM1; `names`: of all its joints. The transport must outlive it.
   CrtkArm(Transport& transport, const std::string& arm, std::vector<std::string> names);
-  ~CrtkArm();
 
   /// Positions of all joints, rad and m, as a message of now. Throws InputError for another number of them.
   JointMessage joints(std::vector<double> positions) const;

@@ -75,19 +75,20 @@ CrtkRobot::CrtkRobot(Transport& transport, const std::string& arm, const Interlo
   // Who only observes is no publisher either: others may watch for those.
   if (config.motion_enabled) servo_jp_ = transport.set_point_publisher(topic_of(arm, "servo_jp"));
   const auto joints = [&](const char* topic, void (Interlock::*tell)(const JointMessage&, double)) {
-    subscriptions_.push_back(transport.subscribe_joints(topic_of(arm, topic), [this, tell](JointMessage&& message) {
-      const double arrival_s = clock_.now_s();
-      std::unique_lock lock(mutex_);
-      (interlock_.*tell)(message, arrival_s);
-      const std::string complaint = new_complaint();
-      lock.unlock();  // stderr may block, and command() needs the interlock
-      if (!complaint.empty()) std::fprintf(stderr, "lapservo: %s: %s\n", arm_.c_str(), complaint.c_str());
-    }));
+    subscriptions_.push_back(
+        transport.subscribe<JointMessage>(topic_of(arm, topic), [this, tell](JointMessage&& message) {
+          const double arrival_s = clock_.now_s();
+          std::unique_lock lock(mutex_);
+          (interlock_.*tell)(message, arrival_s);
+          const std::string complaint = new_complaint();
+          lock.unlock();  // stderr may block, and command() needs the interlock
+          if (!complaint.empty()) std::fprintf(stderr, "lapservo: %s: %s\n", arm_.c_str(), complaint.c_str());
+        }));
   };
   joints("measured_js", &Interlock::on_measured);
   joints("setpoint_js", &Interlock::on_setpoint);
-  subscriptions_.push_back(
-      transport.subscribe_operating_state(topic_of(arm, "operating_state"), [this](OperatingStateMessage&& message) {
+  subscriptions_.push_back(transport.subscribe<OperatingStateMessage>(
+      topic_of(arm, "operating_state"), [this](OperatingStateMessage&& message) {
         const double arrival_s = clock_.now_s();
         const std::lock_guard lock(mutex_);
         interlock_.on_operating_state(message, arrival_s);

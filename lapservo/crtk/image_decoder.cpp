@@ -6,6 +6,7 @@
 #include <memory>
 #include <string_view>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include <fmt/format.h>
@@ -21,13 +22,13 @@ namespace {
 constexpr std::uint32_t max_px = 16384;
 constexpr std::size_t max_compressed = std::size_t{64} << 20;
 
-// How pixels lie, and what makes BGR of them: one of OpenCV's conversions; keep: they are BGR; uyvy, yuyv, nv12: they
-// are that.
-constexpr int keep = -1, uyvy = -2, yuyv = -3, nv12 = -4;
+// How pixels lie, and what makes BGR of them: one of OpenCV's conversions; keep: they are BGR.
+constexpr int keep = -1;
+using Layout = YuvPicture::Layout;
 struct Encoding {
   std::string_view name;
   int channels, bytes;  // of a channel
-  int conversion;
+  std::variant<int, Layout> conversion;
 };
 // OpenCV names Bayer patterns by the second row's second and third pixel.
 constexpr std::array encodings{
@@ -38,11 +39,11 @@ constexpr std::array encodings{
     Encoding{"rgba8", 4, 1, cv::COLOR_RGBA2BGR},
     Encoding{"bgr16", 3, 2, keep},
     Encoding{"rgb16", 3, 2, cv::COLOR_RGB2BGR},
-    Encoding{"yuv422", 2, 1, uyvy},
-    Encoding{"uyvy", 2, 1, uyvy},
-    Encoding{"yuv422_yuy2", 2, 1, yuyv},
-    Encoding{"yuyv", 2, 1, yuyv},
-    Encoding{"nv12", 1, 1, nv12},  // not in image_encodings.h; as NVIDIA's nodes publish it
+    Encoding{"yuv422", 2, 1, Layout::uyvy},
+    Encoding{"uyvy", 2, 1, Layout::uyvy},
+    Encoding{"yuv422_yuy2", 2, 1, Layout::yuyv},
+    Encoding{"yuyv", 2, 1, Layout::yuyv},
+    Encoding{"nv12", 1, 1, Layout::nv12},  // not in image_encodings.h; as NVIDIA's nodes publish it
     Encoding{"bayer_rggb8", 1, 1, cv::COLOR_BayerBG2BGR},
     Encoding{"bayer_bggr8", 1, 1, cv::COLOR_BayerRG2BGR},
     Encoding{"bayer_gbrg8", 1, 1, cv::COLOR_BayerGR2BGR},
@@ -70,7 +71,7 @@ BadImage bad_encoding(const std::string& encoding) {
 
 // By the matrix of its height; chroma lies on the left of each two pixels, as cameras send it. Chroma of nv12 lies in
 // the rows below luma's.
-DecodedImage bgr_of(const cv::Mat& pixels, cv::Size size, YuvPicture::Layout layout) {
+DecodedImage bgr_of(const cv::Mat& pixels, cv::Size size, Layout layout) {
   const int step = static_cast<int>(pixels.step);
   const YuvPicture picture{layout, size, {pixels.ptr(0), pixels.data + pixels.step * size.height}, {step, step}};
   cv::Mat bgr;
@@ -122,7 +123,8 @@ DecodedImage decode(ImageMessage message) {
                                   [&](const Encoding& known) { return known.name == message.encoding; });
   if (found == encodings.end()) return bad_encoding(message.encoding);
   const auto [width, height, step] = std::array{message.width, message.height, message.step};
-  const bool half_chroma = found->conversion == nv12;
+  const auto* const layout = std::get_if<Layout>(&found->conversion);
+  const bool half_chroma = layout && *layout == Layout::nv12;
   if (width == 0 || height == 0 || width > max_px || height > max_px ||
       ((found->channels == 2 || half_chroma) && width % 2 != 0) || (half_chroma && height % 2 != 0))
     return BadImage{fmt::format("size {}x{}", width, height)};
@@ -136,20 +138,12 @@ DecodedImage decode(ImageMessage message) {
   cv::Mat pixels = found->bytes == 2 ? upper_bytes(bytes, message.is_bigendian) : bytes;
   pixels = pixels.reshape(found->channels);
   const cv::Size size(static_cast<int>(width), static_cast<int>(height));
-  switch (found->conversion) {
-    case keep:
-      return found->bytes == 1 && step == row ? keep_bytes(std::move(message.data), size) : pixels.clone();
-    case uyvy:
-      return bgr_of(pixels, size, YuvPicture::Layout::uyvy);
-    case yuyv:
-      return bgr_of(pixels, size, YuvPicture::Layout::yuyv);
-    case nv12:
-      return bgr_of(pixels, size, YuvPicture::Layout::nv12);
-    default:
-      break;
-  }
+  if (layout) return bgr_of(pixels, size, *layout);
+  const int conversion = std::get<int>(found->conversion);
+  if (conversion == keep)
+    return found->bytes == 1 && step == row ? keep_bytes(std::move(message.data), size) : pixels.clone();
   cv::Mat bgr;
-  cv::cvtColor(pixels, bgr, found->conversion);
+  cv::cvtColor(pixels, bgr, conversion);
   return bgr;
 }
 

@@ -26,41 +26,12 @@ std::string ImageCounts::text() const {
   return text;
 }
 
-void ImageReceiver::receive(ImageMessage&& message, double arrival_s) {
-  take(message, arrival_s);
-}
-
-void ImageReceiver::receive(CompressedImageMessage&& message, double arrival_s) {
-  take(message, arrival_s);
-}
-
-template <typename Image>
-void ImageReceiver::take(Image& message, double arrival_s) {
+void ImageReceiver::receive(Message&& message, double arrival_s) {
+  const auto [source, stamp_s] =
+      std::visit([](const auto& one) { return std::pair(one.source, one.stamp_s); }, message);
   const std::lock_guard lock(mutex_);
-  if (is_of_first_sender(message.source, arrival_s)) {
-    const double stamp_s = message.stamp_s;
-    accept(stamp_s, arrival_s, std::move(message));
-  } else {
-    refuse(&ImageCounts::other_senders, "two programs publish this camera's images");
-  }
-}
-
-bool ImageReceiver::is_of_first_sender(std::uint64_t source, double arrival_s) {
-  const bool had_rival = sender_.has_rival(arrival_s);
-  const FirstSender::Verdict verdict = sender_.hear(source, arrival_s);
-  if (verdict == FirstSender::Verdict::counts_anew) last_stamp_s_.reset();
-  if (verdict == FirstSender::Verdict::counts_anew || (!had_rival && sender_.has_rival(arrival_s)))
-    second_sender_ = true;
-  return verdict != FirstSender::Verdict::other;
-}
-
-bool ImageReceiver::take_second_sender() {
-  const std::lock_guard lock(mutex_);
-  return std::exchange(second_sender_, false);
-}
-
-// With the mutex held.
-void ImageReceiver::accept(double stamp_s, double arrival_s, Message&& message) {
+  if (!is_of_first_sender(source, arrival_s))
+    return refuse(&ImageCounts::other_senders, "two programs publish this camera's images");
   const StampClock::Reading measured = clock_.read(stamp_s, arrival_s);
   switch (measured.verdict) {
     case StampVerdict::fresh:
@@ -79,6 +50,20 @@ void ImageReceiver::accept(double stamp_s, double arrival_s, Message&& message) 
   if (waiting_) ++counts_.skipped;
   const double time_s = stamps_by_ == StampsBy::loop ? std::min(stamp_s, arrival_s) : measured.time_s;
   waiting_ = Waiting{time_s, std::move(message)};
+}
+
+bool ImageReceiver::is_of_first_sender(std::uint64_t source, double arrival_s) {
+  const bool had_rival = sender_.has_rival(arrival_s);
+  const FirstSender::Verdict verdict = sender_.hear(source, arrival_s);
+  if (verdict == FirstSender::Verdict::counts_anew) last_stamp_s_.reset();
+  if (verdict == FirstSender::Verdict::counts_anew || (!had_rival && sender_.has_rival(arrival_s)))
+    second_sender_ = true;
+  return verdict != FirstSender::Verdict::other;
+}
+
+bool ImageReceiver::take_second_sender() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(second_sender_, false);
 }
 
 // The usual distance follows the shortest ones seen.

@@ -40,8 +40,8 @@ class ImageReceiver : public ImageStream {
       : size_(width_px, height_px), stamps_by_(stamps_by) {}
 
   // By the transport's threads, with the time of arrival on the loop's clock.
-  void receive(ImageMessage&& message, double arrival_s);
-  void receive(CompressedImageMessage&& message, double arrival_s);
+  using Message = std::variant<ImageMessage, CompressedImageMessage>;
+  void receive(Message&& message, double arrival_s);
 
   std::optional<StampedImage> newest() override;
 
@@ -53,16 +53,12 @@ class ImageReceiver : public ImageStream {
   bool take_second_sender() override;
 
  private:
-  using Message = std::variant<ImageMessage, CompressedImageMessage>;
   struct Waiting {
     double time_s = 0;
     Message message;
   };
 
-  template <typename Image>
-  void take(Image& message, double arrival_s);
   bool is_of_first_sender(std::uint64_t source, double arrival_s);
-  void accept(double stamp_s, double arrival_s, Message&& message);
   void count_gap(double stamp_s);
   void refuse(long ImageCounts::*count, const std::string& why);
 

@@ -22,10 +22,6 @@ constexpr double same_other = 4e-3;
 // An arm that we do not move stays within same_q for so long; after our own motion it may settle first.
 constexpr double rest_s = 0.5, settling_s = 0.2;
 
-bool all_finite(const std::vector<double>& values) {
-  return std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
-}
-
 // An arm that does not move, or moves for somebody else, must not get another setpoint. The others still listen.
 bool obeys(Blocked why) {
   switch (why) {
@@ -60,11 +56,11 @@ bool lies_between(const Eigen::Vector4d& q, const Eigen::Vector4d& from, const E
 
 InterlockConfig interlock_of(const Instrument& instrument, const JointLimits& limits_of_q, bool motion_enabled,
                              std::size_t max_readers) {
-  InterlockConfig config{.joints = instrument.joints.value(), .limits = limits_of_q};
-  config.motion_enabled = motion_enabled;
-  config.max_readers = max_readers;
-  config.wrist = wrist_names(instrument.tool);
-  return config;
+  return {.joints = instrument.joints.value(),
+          .limits = limits_of_q,
+          .max_readers = max_readers,
+          .motion_enabled = motion_enabled,
+          .wrist = wrist_names(instrument.tool)};
 }
 
 Interlock::Interlock(const InterlockConfig& config)
@@ -95,9 +91,7 @@ void Interlock::begin_anew(double arrival_s) {
   measured_.reset(), setpoint_.reset(), operating_state_.reset();
   rest_.reset(), moved_s_.reset();
   sent_.clear();
-  stop(Blocked::restarted);
-  untold_ = Blocked::restarted;
-  blocked_s_ = arrival_s;
+  give_up(Blocked::restarted, arrival_s);
 }
 
 std::string Interlock::complaint() const {
@@ -314,19 +308,15 @@ Eigen::Vector4d Interlock::within_limits(const Eigen::Vector4d& wanted) const {
   return wanted.cwiseMax(config_.limits.lower.cwiseMin(last_)).cwiseMin(config_.limits.upper.cwiseMax(last_));
 }
 
-std::vector<double> Interlock::all_joints() const {
-  std::vector<double> positions = others_;
-  const Eigen::Vector4d joints = joints_from_q(config_.joints, last_);
-  for (int i = 0; i < 4; ++i) positions[places_[i]] = joints[i];
-  return positions;
+std::vector<double> Interlock::with_the_four(std::vector<double> joints, const Eigen::Vector4d& four) const {
+  for (int i = 0; i < 4; ++i) joints[places_[i]] = four[i];
+  return joints;
 }
 
 std::vector<double> Interlock::velocities() const {
-  std::vector<double> velocities(others_.size(), 0.0);
   const Eigen::Vector4d at_rest = Eigen::Vector4d::Zero();
-  const Eigen::Vector4d joints = joints_from_q(config_.joints, velocity_) - joints_from_q(config_.joints, at_rest);
-  for (int i = 0; i < 4; ++i) velocities[places_[i]] = joints[i];
-  return velocities;
+  return with_the_four(std::vector<double>(others_.size()),
+                       joints_from_q(config_.joints, velocity_) - joints_from_q(config_.joints, at_rest));
 }
 
 // The velocity over the coming period of a joint that is `away` from its path: at rest exactly onto it, else with the
@@ -367,24 +357,21 @@ std::optional<std::vector<double>> Interlock::send(double now_s) {
   sent_.push_back({now_s, last_});
   while (now_s - sent_.front().time_s > memory_s + config_.max_age_s) sent_.pop_front();
   ++(config_.motion_enabled ? counts_.set_points : counts_.withheld);
-  return config_.motion_enabled ? std::optional(all_joints()) : std::nullopt;
+  return config_.motion_enabled ? std::optional(with_the_four(others_, joints_from_q(config_.joints, last_)))
+                                : std::nullopt;
 }
 
-void Interlock::on_suspended(double now_s) {
-  untold_ = Blocked::loop_late;
+void Interlock::give_up(Blocked why, double now_s) {
+  untold_ = why;
   blocked_s_ = now_s;
-  stop(Blocked::loop_late);
+  stop(why);
 }
 
 // After a pause the arm may not have what was sent last: from where it is, the next setpoint would be a step.
 bool Interlock::is_lost_on_its_way(double now_s) {
   constexpr double lost_s = 0.7;
   if (phase_ != Phase::idle || !continues_ || lies_between(setpoint_->q, last_, last_)) return false;
-  if (now_s - sent_.back().time_s > lost_s) {
-    untold_ = Blocked::displaced;
-    blocked_s_ = now_s;
-    stop(Blocked::displaced);
-  }
+  if (now_s - sent_.back().time_s > lost_s) give_up(Blocked::displaced, now_s);
   return true;
 }
 

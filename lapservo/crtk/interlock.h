@@ -75,7 +75,7 @@ class Interlock {
   /// So many nodes read the setpoints.
   void on_readers(std::size_t count) { readers_ = count; }
   /// The computer was suspended: the arm may be anywhere.
-  void on_suspended(double now_s);
+  void on_suspended(double now_s) { give_up(Blocked::loop_late, now_s); }
   /// Another program sends setpoints to this arm.
   void on_foreign_command(double arrival_s);
 
@@ -121,6 +121,7 @@ class Interlock {
   Blocked blocked(double now_s) const;
   void watch(double now_s);
   void stop(Blocked why);
+  void give_up(Blocked why, double now_s);
   void begin_anew(double arrival_s);
   void watch_rest(double now_s);
   bool is_lost_on_its_way(double now_s);
@@ -138,7 +139,7 @@ class Interlock {
   double next_velocity(Eigen::Index joint, double away, double path_velocity) const;
   bool approach(const MotionState& wanted);
   std::optional<std::vector<double>> send(double now_s);
-  std::vector<double> all_joints() const;
+  std::vector<double> with_the_four(std::vector<double> joints, const Eigen::Vector4d& four) const;
 
   InterlockConfig config_;
   InterlockCounts counts_;

@@ -1,7 +1,5 @@
 #include "lapservo/crtk/joint_map.h"
 
-#include <algorithm>
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <optional>
 #include <string>
@@ -12,6 +14,10 @@
 #include "lapservo/rig/joint_conversion.h"
 
 namespace lapservo::internal {
+
+inline bool all_finite(const std::vector<double>& values) {
+  return std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
+}
 
 /// Bounds of q from bounds of the arm's joints.
 JointLimits limits_of_q(const Joints& joints, const JointLimits& limits);

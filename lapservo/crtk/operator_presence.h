@@ -8,12 +8,12 @@
 
 namespace lapservo::internal {
 
-/// Whether an operator presses a button of a topic, for example a foot pedal: see Transport::subscribe_buttons().
+/// Whether an operator presses a button of a topic, for example a foot pedal: see Transport::subscribe().
 class OperatorPresence {
  public:
   /// Both must outlive it.
   OperatorPresence(Transport& transport, const std::string& topic, const Clock& clock)
-      : clock_(clock), subscription_(transport.subscribe_buttons(topic, [this](BoolMessage&& pressed) {
+      : clock_(clock), subscription_(transport.subscribe<BoolMessage>(topic, [this](BoolMessage&& pressed) {
           pressed.value ? button_.press(clock_.now_s()) : button_.release();
         })) {}
 

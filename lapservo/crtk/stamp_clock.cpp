@@ -4,8 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include "lapservo/core/words.h"
-
 namespace lapservo::internal {
 namespace {
 
@@ -15,18 +13,7 @@ constexpr double disorder_s = 1e-3;     // by which a sender's threads stamp out
 constexpr double way_s = 0.05;          // by which two messages' ways differ
 constexpr double patience_s = 1;        // with messages that are late by the same
 
-constexpr Words<StampVerdict, 5> verdict_words{{{StampVerdict::fresh, "fresh"},
-                                                {StampVerdict::repeated, "repeated"},
-                                                {StampVerdict::late, "late"},
-                                                {StampVerdict::jumped, "jumped"},
-                                                {StampVerdict::unusable, "unusable"}}};
-static_assert(names_all(verdict_words, StampVerdict::unusable));
-
 }  // namespace
-
-std::string_view to_string(StampVerdict verdict) {
-  return word_of(verdict_words, verdict);
-}
 
 void StampClock::start_anew(const Stamped& message) {
   last_ = message;

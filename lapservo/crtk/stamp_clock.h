@@ -1,7 +1,6 @@
 #pragma once
 
 #include <optional>
-#include <string_view>
 
 namespace lapservo::internal {
 
@@ -13,8 +12,6 @@ enum class StampVerdict {
   jumped,    ///< the sender's clock was set, forwards or back; the next message counts again
   unusable,  ///< no stamp: zero or not finite
 };
-/// The enumerator's name.
-std::string_view to_string(StampVerdict verdict);
 
 /// Puts a sender's stamps on the loop's clock without asking that both computers agree on the time: the smallest
 /// difference between arrival and stamp is taken for that of the clocks. So a time is as if the message had travelled

@@ -28,7 +28,7 @@ class StandingClock : public Clock {
 /// Topics in memory: messages that are published are kept; handlers get what say() says, in the caller's thread.
 class TestTransport : public Transport {
  public:
-  Publisher<JointMessage> set_point_publisher(const std::string& topic) override { return joint_publisher(topic); }
+  Publisher<JointMessage> set_point_publisher(const std::string& on) override { return publisher<JointMessage>(on); }
   Subscription subscribe_commands(const std::string& topic, CommandType, Handler<CommandMessage> handler) override {
     return add(topic, handler);
   }

@@ -28,41 +28,21 @@ class Transport {
   using Subscription = std::shared_ptr<void>;
 
   /// Publishers may be called from every thread; a copy that lives keeps the topic alive.
-  auto joint_publisher(const std::string& topic) { return opened<JointMessage>(topic); }
-  auto operating_state_publisher(const std::string& topic) { return opened<OperatingStateMessage>(topic); }
-  auto string_publisher(const std::string& topic) { return opened<StringMessage>(topic); }
-  auto joy_publisher(const std::string& topic) { return opened<JoyMessage>(topic); }
-  auto bool_publisher(const std::string& topic) { return opened<BoolMessage>(topic); }
-  auto trajectory_publisher(const std::string& topic) { return opened<TrajectoryMessage>(topic); }
-  auto image_publisher(const std::string& topic) { return opened<ImageMessage>(topic); }
-  auto compressed_image_publisher(const std::string& topic) { return opened<CompressedImageMessage>(topic); }
-  auto camera_info_publisher(const std::string& topic) { return opened<CameraInfoMessage>(topic); }
-  auto pose_publisher(const std::string& topic) { return opened<PoseMessage>(topic); }
-  auto place_publisher(const std::string& topic) { return opened<PlaceMessage>(topic); }
-  auto transform_publisher(const std::string& topic) { return opened<TransformsMessage>(topic); }
-  auto static_transform_publisher(const std::string& topic) { return opened<StaticTransformsMessage>(topic); }
-  auto cylinder_publisher(const std::string& topic) { return opened<CylindersMessage>(topic); }
-  auto diagnostic_publisher(const std::string& topic) { return opened<DiagnosticMessage>(topic); }
-  auto observation_publisher(const std::string& topic) { return opened<ObservationMessage>(topic); }
+  template <typename Message>
+  Publisher<Message> publisher(const std::string& topic) {
+    AnyPublisher made = Publisher<Message>();
+    open(topic, made);
+    return std::get<Publisher<Message>>(std::move(made));
+  }
   /// For servo_jp: only the newest setpoint is kept, for 50 ms, and none reaches a subscriber that came after it.
   virtual Publisher<JointMessage> set_point_publisher(const std::string& topic) = 0;
 
-  /// Messages that this transport's own publishers sent are left out.
-  Subscription subscribe_joints(const std::string& topic, Handler<JointMessage> take) { return listen(topic, take); }
-  Subscription subscribe_operating_state(const std::string& topic, Handler<OperatingStateMessage> take) {
-    return listen(topic, take);
+  /// Messages that this transport's own publishers sent are left out. A BoolMessage is whether a button is pressed: a
+  /// std_msgs/Bool, or the first button of a sensor_msgs/Joy, by the publisher's type.
+  template <typename Message>
+  Subscription subscribe(const std::string& topic, Handler<Message> take) {
+    return listen(topic, std::move(take));
   }
-  Subscription subscribe_strings(const std::string& topic, Handler<StringMessage> take) { return listen(topic, take); }
-  /// Whether a button is pressed: a std_msgs/Bool, or the first button of a sensor_msgs/Joy, by the publisher's type.
-  Subscription subscribe_buttons(const std::string& topic, Handler<BoolMessage> take) { return listen(topic, take); }
-  Subscription subscribe_trajectories(const std::string& topic, Handler<TrajectoryMessage> take) {
-    return listen(topic, take);
-  }
-  Subscription subscribe_images(const std::string& topic, Handler<ImageMessage> take) { return listen(topic, take); }
-  Subscription subscribe_compressed_images(const std::string& topic, Handler<CompressedImageMessage> take) {
-    return listen(topic, take);
-  }
-  Subscription subscribe_places(const std::string& topic, Handler<PlaceMessage> take) { return listen(topic, take); }
   virtual Subscription subscribe_commands(const std::string& topic, CommandType type,
                                           Handler<CommandMessage> handler) = 0;
 
@@ -98,13 +78,6 @@ class Transport {
   /// Makes the publisher that the variant holds one of this topic.
   virtual void open(const std::string& topic, AnyPublisher& publisher) = 0;
   virtual Subscription listen(const std::string& topic, const AnyHandler& handler) = 0;
-
-  template <typename Message>
-  Publisher<Message> opened(const std::string& topic) {
-    AnyPublisher made = Publisher<Message>();
-    open(topic, made);
-    return std::get<Publisher<Message>>(std::move(made));
-  }
 };
 
 }  // namespace lapservo::internal

@@ -72,17 +72,17 @@ FrameTopics::FrameTopics(Transport& transport, const Rig& rig, const FrameNames&
     : transport_(transport),
       names_(names),
       rcm_moves_(rcm_moves),
-      moving_(transport.transform_publisher("/tf")),
-      resting_(transport.static_transform_publisher("/tf_static")) {
+      moving_(transport.publisher<TransformsMessage>("/tf")),
+      resting_(transport.publisher<StaticTransformsMessage>("/tf_static")) {
   for (const Instrument& instrument : rig.instruments) {
     const std::string& name = instrument.name;
     const std::string topics = "/lapservo/" + name + "/";
     told_.push_back({instrument,
                      {names.camera, with_name(names.rcm, name), with_name(names.marker, name),
                       with_name(names.shaft, name), with_name(names.tip, name)},
-                     transport.pose_publisher(topics + "pose"),
-                     instrument.tool ? transport.pose_publisher(topics + "tip_cp") : nullptr,
-                     transport.cylinder_publisher(topics + "markers")});
+                     transport.publisher<PoseMessage>(topics + "pose"),
+                     instrument.tool ? transport.publisher<PoseMessage>(topics + "tip_cp") : nullptr,
+                     transport.publisher<CylindersMessage>(topics + "markers")});
   }
   tell_rcms();
 }

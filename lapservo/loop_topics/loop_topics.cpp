@@ -1,6 +1,5 @@
 #include "lapservo/loop_topics/loop_topics.h"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -12,6 +11,7 @@
 #include "lapservo/core/error.h"
 #include "lapservo/core/lower_case.h"
 #include "lapservo/core/printable.h"
+#include "lapservo/crtk/joint_map.h"
 #include "lapservo/io/overlay.h"
 #include "lapservo/io/pictures/jpeg_encoding.h"
 #include "lapservo/rig/single_instrument.h"
@@ -54,9 +54,8 @@ std::string topic(const Rig& rig, const std::string& name) {
 
 // Throws InputError for what makes no sense.
 Eigen::Vector4d features_of(const JointMessage& message) {
-  const auto is_finite = [](double value) { return std::isfinite(value); };
   if (message.names != feature_names() || message.positions.size() != FeatureVector::size ||
-      !std::all_of(message.positions.begin(), message.positions.end(), is_finite))
+      !all_finite(message.positions))
     throw InputError("set_point", "expected four finite positions named s_rad, r_px, l_px, d_px");
   return Eigen::Vector4d(message.positions.data());
 }
@@ -111,15 +110,15 @@ TipGoal tip_goal_of(const PlaceMessage& message) {
 LoopTopics::LoopTopics(Transport& transport, const Rig& rig, const FrameNames& frames, bool rcm_moves, bool hears)
     : transport_(transport),
       rig_(rig),
-      observation_(transport.observation_publisher(topic(rig, "observation"))),
+      observation_(transport.publisher<ObservationMessage>(topic(rig, "observation"))),
       frames_(transport, first_instrument(rig, "rig"), frames, rcm_moves),
-      desired_(transport.joint_publisher(topic(rig, "desired"))),
-      error_(transport.joint_publisher(topic(rig, "error"))),
-      diagnostics_(transport.diagnostic_publisher("/diagnostics")),
-      overlay_(transport.compressed_image_publisher(topic(rig, "overlay/compressed"))),
+      desired_(transport.publisher<JointMessage>(topic(rig, "desired"))),
+      error_(transport.publisher<JointMessage>(topic(rig, "error"))),
+      diagnostics_(transport.publisher<DiagnosticMessage>("/diagnostics")),
+      overlay_(transport.publisher<CompressedImageMessage>(topic(rig, "overlay/compressed"))),
       started_s_{never, never},
       other_loop_s_(never) {
-  subscriptions_.push_back(transport.subscribe_joints(topic(rig, "desired"), [this](JointMessage&&) {
+  subscriptions_.push_back(transport.subscribe<JointMessage>(topic(rig, "desired"), [this](JointMessage&&) {
     const std::lock_guard lock(mutex_);
     other_loop_s_ = SteadyClock().now_s();
   }));
@@ -129,13 +128,10 @@ LoopTopics::LoopTopics(Transport& transport, const Rig& rig, const FrameNames& f
 
 void LoopTopics::hear_wishes() {
   subscriptions_.push_back(
-      transport_.subscribe_strings(topic(rig_, "command"), [this](StringMessage&& command) { hear(command); }));
-  subscriptions_.push_back(
-      transport_.subscribe_joints(topic(rig_, "set_point"), [this](JointMessage&& set_point) { hear(set_point); }));
-  subscriptions_.push_back(
-      transport_.subscribe_places(topic(rig_, "tip_goal"), [this](PlaceMessage&& tip_goal) { hear(tip_goal); }));
-  subscriptions_.push_back(transport_.subscribe_trajectories(
-      topic(rig_, "trajectory"), [this](TrajectoryMessage&& trajectory) { hear(trajectory); }));
+      transport_.subscribe<StringMessage>(topic(rig_, "command"), [this](StringMessage&& command) { hear(command); }));
+  hear_goals("set_point", features_of, &LoopWishes::set_point);
+  hear_goals("tip_goal", tip_goal_of, &LoopWishes::tip_goal);
+  hear_goals("trajectory", trajectory_of, &LoopWishes::trajectory);
 }
 
 LoopTopics::~LoopTopics() {
@@ -233,19 +229,22 @@ void LoopTopics::remark(const std::string& text) {
 }
 
 // The last of all goals counts.
-template <typename Make, typename Goal>
-void LoopTopics::want(const Make& make, std::optional<Goal> LoopWishes::*wish) {
-  std::optional<Goal> goal;
-  std::string refusal;
-  try {
-    goal = make();
-  } catch (const InputError& error) {
-    refusal = std::string("refused: ") + error.what();
-  }
-  const std::lock_guard lock(mutex_);
-  if (!goal) return remark(refusal);
-  wishes_.set_point.reset(), wishes_.tip_goal.reset(), wishes_.trajectory.reset();
-  wishes_.*wish = std::move(goal);
+template <typename Message, typename Goal>
+void LoopTopics::hear_goals(const char* name, Goal (*goal_of)(const Message&), std::optional<Goal> LoopWishes::*wish) {
+  const auto hear_goal = [this, goal_of, wish](Message&& message) {
+    std::optional<Goal> goal;
+    std::string refusal;
+    try {
+      goal = goal_of(message);
+    } catch (const InputError& error) {
+      refusal = std::string("refused: ") + error.what();
+    }
+    const std::lock_guard lock(mutex_);
+    if (!goal) return remark(refusal);
+    wishes_.set_point.reset(), wishes_.tip_goal.reset(), wishes_.trajectory.reset();
+    wishes_.*wish = std::move(goal);
+  };
+  subscriptions_.push_back(transport_.subscribe<Message>(topic(rig_, name), hear_goal));
 }
 
 void LoopTopics::hear_start(const StringMessage& command, bool force) {
@@ -262,18 +261,6 @@ bool LoopTopics::name_is_in_use() const {
   constexpr double lasts_s = 1;
   const std::lock_guard lock(mutex_);
   return SteadyClock().now_s() - other_loop_s_ < lasts_s;
-}
-
-void LoopTopics::hear(const JointMessage& message) {
-  want([&] { return features_of(message); }, &LoopWishes::set_point);
-}
-
-void LoopTopics::hear(const PlaceMessage& message) {
-  want([&] { return tip_goal_of(message); }, &LoopWishes::tip_goal);
-}
-
-void LoopTopics::hear(const TrajectoryMessage& message) {
-  want([&] { return trajectory_of(message); }, &LoopWishes::trajectory);
 }
 
 LoopWishes LoopTopics::wishes() {

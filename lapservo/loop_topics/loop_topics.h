@@ -64,11 +64,8 @@ class LoopTopics {
   void hear_wishes();
   void hear(const StringMessage& command);
   void hear_start(const StringMessage& command, bool force);
-  void hear(const JointMessage& set_point);
-  void hear(const PlaceMessage& tip_goal);
-  void hear(const TrajectoryMessage& trajectory);
-  template <typename Make, typename Goal>
-  void want(const Make& make, std::optional<Goal> LoopWishes::*wish);
+  template <typename Message, typename Goal>
+  void hear_goals(const char* name, Goal (*goal_of)(const Message&), std::optional<Goal> LoopWishes::*wish);
   void remark(const std::string& text);
   void draw();
 

@@ -12,7 +12,8 @@ namespace {
 
 constexpr int agreed_after = 10, moved_after = 2;
 
-// Largest believable motion of theta, phi (rad), rho (m) against the joints, from one image to the next.
+// Largest believable motion of theta, phi (rad), rho (m) against the joints, from one image to the next. A turn about
+// the RCM looks like a jump of the joints, which these would have shown.
 const Eigen::Vector3d max_jump(0.03, 0.03, 0.003);
 
 // By so much a shaft misfits the RCM of an endoscope that moved, while the offset moves, and where it is not seen to.
@@ -119,8 +120,9 @@ void EndoscopeRecovery::watch(Watching& watching, const ImageMeasurement& image,
   seen_joints_ = image.camera_from_marker ? seen_joints(rig_.camera, instrument(), sighting(image, *measured_), before)
                                           : std::nullopt;
   const bool moves = stepped(image, controller.delay_is_known());
-  const bool contradicts = seen_joints_ && (seen_joints_->misfit_rad > most_misfit_rad(watching, moves) ||
-                                            jumped(seen_joints_->offset - before));
+  const bool contradicts =
+      seen_joints_ && (seen_joints_->misfit_rad > most_misfit_rad(watching, moves) ||
+                       ((seen_joints_->offset - before).head<3>().cwiseAbs().array() > max_jump.array()).any());
   watching.contradicting = contradicts ? watching.contradicting + 1 : 0;
   if (!contradicts && !moves) return drop_suspicion(controller);
   if (agreeing_ < agreed_after) return;
@@ -166,11 +168,6 @@ void EndoscopeRecovery::doubt(HoldReason reason, VisualController& controller) {
   auto* watching = std::get_if<Watching>(&state_);
   if (!watching) return wrong_rig() ? void() : measure(controller);
   if (reason == HoldReason::wild_joints) watching->offsets.clear();
-}
-
-// A turn about the RCM looks like a jump of the joints, which these would have shown.
-bool EndoscopeRecovery::jumped(const Eigen::Vector4d& by) {
-  return (by.head<3>().cwiseAbs().array() > max_jump.array()).any();
 }
 
 bool EndoscopeRecovery::follow_joints(const ImageMeasurement& image, VisualController& controller) {

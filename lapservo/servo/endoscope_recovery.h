@@ -89,7 +89,6 @@ class EndoscopeRecovery {
   void collect(const ImageMeasurement& image, VisualController& controller);
   enum class Blame { any, named, sign };  ///< whatever of the rig is wrong; one number; one joint's sign
   bool blames_rig(VisualController& controller, Blame wanted);
-  static bool jumped(const Eigen::Vector4d& by);
   bool stepped(const ImageMeasurement& image, bool delay_is_known);
   void watch(Watching& watching, const ImageMeasurement& image, VisualController& controller);
   void notice(Watching& watching, VisualController& controller);

@@ -28,12 +28,8 @@ FeatureModel feature_model(const Rig& rig, const Rigid3& camera_from_rcm) {
   return [image](const Eigen::Vector4d& q) -> std::optional<FeatureState> {
     const auto [reason, point] = feature_map(image, JointVector::from_vector(q));
     if (!point) return std::nullopt;
-    FeatureState state;
-    state.features = point->f;
-    state.jacobian = point->jacobian;
-    state.ends_px = both_ends(point->ideal_px[0], point->ideal_px[3]);
-    state.ends_jacobian = point->ends_jacobian;
-    return state;
+    return FeatureState{point->f, point->jacobian, both_ends(point->ideal_px[0], point->ideal_px[3]),
+                        point->ends_jacobian};
   };
 }
 

@@ -88,30 +88,24 @@ void refuse_at_once(const Supervisor& arm, const Clock& clock, const RunConfig& 
 }
 
 // Refuses what only the first joints and the first image show, before they move anything.
-class FirstSight {
- public:
-  FirstSight(const RunConfig& config, const ControllerConfig& controller, const Trajectory& trajectory,
-             double duration_s)
-      : config_(config), controller_(controller), trajectory_(trajectory), duration_s_(duration_s) {}
+struct FirstSight {
+  const RunConfig& config;
+  const ControllerConfig& controller;
+  const Trajectory& trajectory;
+  double duration_s;
+  bool saw_joints = false, saw_image = false;
 
   void check(const ControlTick& tick, const Supervisor& arm) {
-    if (tick.seen && !std::exchange(saw_image_, true))
+    if (tick.seen && !std::exchange(saw_image, true))
       refuse_other_clock("ImageStream", tick.seen->image.time_s, tick.input.time_s);
     const JointState& joints = tick.input.joints;
     // While it is held, others still bring it to where the loop will begin.
-    if (!joints.q.vector().allFinite() || arm.held() || std::exchange(saw_joints_, true)) return;
+    if (!joints.q.vector().allFinite() || arm.held() || std::exchange(saw_joints, true)) return;
     refuse_other_clock("JointState", joints.time_s, tick.input.time_s);
     if (arm.is_simulated() && !joints.follows) return;
-    refuse_goal(trajectory_, duration_s_, config_.rig, config_.rig.instruments.at(0).camera_from_rcm, controller_,
-                joints, config_.trajectory_name);
+    refuse_goal(trajectory, duration_s, config.rig, config.rig.instruments.at(0).camera_from_rcm, controller, joints,
+                config.trajectory_name);
   }
-
- private:
-  const RunConfig& config_;
-  const ControllerConfig& controller_;
-  const Trajectory& trajectory_;
-  double duration_s_;
-  bool saw_joints_ = false, saw_image_ = false;
 };
 
 // The tip in an image by the wrist as it was then.
@@ -161,7 +155,7 @@ void run(Supervisor& arm, ImageStream& images, Clock& clock, const RunConfig& co
   const Trajectory features = tips.features_of(trajectory);
   std::optional<Rigid3> first_from_rcm =
       config.rig.instruments.at(0).camera_from_rcm;  // of the camera in its first place
-  FirstSight first_sight(config, controller, trajectory, duration_s);
+  FirstSight first_sight{config, controller, trajectory, duration_s};
   Servo servo(controller, config.rig);
   const auto vision =
       track_images(images, config.rig, config.tracker, config.rcm_px, config.tracking_thread, config.endoscope);

@@ -27,7 +27,6 @@
 #include "lapservo/servo/convergence.h"
 #include "lapservo/servo/image_features.h"
 #include "lapservo/servo/image_window.h"
-#include "lapservo/servo/replay.h"
 #include "lapservo/servo/servo_log.h"
 #include "lapservo/sim/arm.h"
 #include "lapservo/sim/simulator.h"

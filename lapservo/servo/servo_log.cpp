@@ -10,6 +10,7 @@
 
 #include "lapservo/core/csv.h"
 #include "lapservo/core/error.h"
+#include "lapservo/servo/servo.h"
 
 namespace lapservo::internal {
 namespace {
@@ -44,7 +45,7 @@ std::string covariance_column(int row, int column) {
   return fmt::format("seen_cov_{}{}", row, column);
 }
 
-std::vector<std::string> make_input_columns() {
+std::vector<std::string> input_columns() {
   std::vector<std::string> columns{"time_s", "arm_state", "arm_blocked", "arm_follows", "arm_started", "joint_time_s"};
   name(columns, "joint_", joints);
   columns.emplace_back("readings");
@@ -59,11 +60,6 @@ std::vector<std::string> make_input_columns() {
   name(columns, "desired_", features);
   name(columns, "desired_", rates);
   name(columns, "desired_", accelerations);
-  return columns;
-}
-
-const std::vector<std::string>& input_columns() {
-  static const std::vector<std::string> columns = make_input_columns();
   return columns;
 }
 
@@ -317,6 +313,18 @@ std::vector<LoggedTick> read_servo_log(const std::filesystem::path& path) {
     ticks.push_back(std::move(tick));
   }
   return ticks;
+}
+
+std::optional<ReplayDifference> replay(const std::vector<LoggedTick>& log, const Rig& rig,
+                                       const ControllerConfig& controller) {
+  Servo servo(controller, rig);
+  for (std::size_t i = 0; i < log.size(); ++i) {
+    const auto fields = decision_fields(servo.step(log[i].input));
+    for (std::size_t k = 0; k < fields.size(); ++k)
+      if (fields[k] != log[i].decision[k])
+        return ReplayDifference{i, decision_columns()[k], log[i].decision[k], fields[k]};
+  }
+  return std::nullopt;
 }
 
 }  // namespace lapservo::internal

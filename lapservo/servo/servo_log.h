@@ -10,9 +10,11 @@
 
 #include <Eigen/Core>
 
+#include "lapservo/control/controller_config.h"
 #include "lapservo/control/feature_model.h"
 #include "lapservo/core/bounded_queue.h"
 #include "lapservo/core/row_file.h"
+#include "lapservo/rig/rig.h"
 #include "lapservo/servo/servo_decision.h"
 
 namespace lapservo::internal {
@@ -60,5 +62,14 @@ std::vector<std::string> decision_fields(const ServoDecision& decision);
 
 /// Throws InputError naming file, line and column.
 std::vector<LoggedTick> read_servo_log(const std::filesystem::path& path);
+
+/// Puts a log's inputs through a servo of the same configuration again. The first tick whose decision differs in any
+/// bit, or nullopt.
+struct ReplayDifference {
+  std::size_t tick = 0;
+  std::string column, logged, replayed;
+};
+std::optional<ReplayDifference> replay(const std::vector<LoggedTick>& log, const Rig& rig,
+                                       const ControllerConfig& controller);
 
 }  // namespace lapservo::internal

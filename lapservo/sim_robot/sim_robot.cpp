@@ -61,9 +61,9 @@ SimRobot::SimRobot(Transport& transport, const Rig& rig, Simulator& simulator, c
       wrist_rad_(simulated_wrist_rad(tool_, simulator.wrist_swung_rad())),
       setpoint_(simulator.measured_jp()),
       last_wanted_(setpoint_),
-      image_(transport.image_publisher(topic_of(config.camera, "image_raw"))),
-      compressed_(transport.compressed_image_publisher(topic_of(config.camera, compressed_topic))),
-      camera_info_(transport.camera_info_publisher(topic_of(config.camera, "camera_info"))),
+      image_(transport.publisher<ImageMessage>(topic_of(config.camera, "image_raw"))),
+      compressed_(transport.publisher<CompressedImageMessage>(topic_of(config.camera, compressed_topic))),
+      camera_info_(transport.publisher<CameraInfoMessage>(topic_of(config.camera, "camera_info"))),
       compressor_([this] { compress(); }) {}
 
 SimRobot::~SimRobot() {

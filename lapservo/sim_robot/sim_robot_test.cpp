@@ -19,14 +19,14 @@ class Room {
     rig.instruments[0].joints = default_joints();
     interlock.emplace(interlock_of(rig.instruments[0], {}, true, 1));
     robot.emplace(transport, rig, simulator, SimRobotConfig{});
-    subscriptions.push_back(transport.subscribe_joints(
+    subscriptions.push_back(transport.subscribe<JointMessage>(
         "/PSM1/measured_js", [this](JointMessage&& message) { interlock->on_measured(message, now_s); }));
-    subscriptions.push_back(transport.subscribe_joints(
+    subscriptions.push_back(transport.subscribe<JointMessage>(
         "/PSM1/setpoint_js", [this](JointMessage&& message) { interlock->on_setpoint(message, now_s); }));
-    subscriptions.push_back(transport.subscribe_operating_state(
+    subscriptions.push_back(transport.subscribe<OperatingStateMessage>(
         "/PSM1/operating_state",
         [this](OperatingStateMessage&& message) { interlock->on_operating_state(message, now_s); }));
-    subscriptions.push_back(transport.subscribe_images(
+    subscriptions.push_back(transport.subscribe<ImageMessage>(
         "/endoscope/image_raw", [this](ImageMessage&& message) { images.receive(std::move(message), now_s); }));
   }
   static SimulatorConfig simulated(double wrist_swing_rad) {

@@ -43,8 +43,8 @@ class Ros2Camera : private Node, public ImageStream {
   Ros2Camera(const std::string& topic, const Camera& camera, const Clock& clock)
       : receiver_(camera.width_px, camera.height_px) {
     const auto sink = [this, &clock](auto&& message) { receiver_.receive(std::move(message), clock.now_s()); };
-    subscription_ = topic.ends_with("/compressed") ? transport.subscribe_compressed_images(topic, sink)
-                                                   : transport.subscribe_images(topic, sink);
+    subscription_ = topic.ends_with("/compressed") ? transport.subscribe<CompressedImageMessage>(topic, sink)
+                                                   : transport.subscribe<ImageMessage>(topic, sink);
   }
   std::optional<StampedImage> newest() override { return receiver_.newest(); }
   bool take_second_sender() override { return receiver_.take_second_sender(); }
@@ -73,7 +73,7 @@ class Ros2Arm : private Node, public CrtkArm {
 class Ros2ImagePublisher : private Node {
  public:
   explicit Ros2ImagePublisher(const std::string& topic)
-      : Node("lapservo_images"), publisher_(transport.image_publisher(topic)) {}
+      : Node("lapservo_images"), publisher_(transport.publisher<ImageMessage>(topic)) {}
 
   void publish(const cv::Mat& bgr, const std::optional<double>& time_s) {
     constexpr double last_s = 2147483647;  // a stamp's

@@ -50,11 +50,7 @@ class Bytes {
     return nsec < 1000000000u ? sec + 1e-9 * nsec : std::numeric_limits<double>::quiet_NaN();
   }
   bool whole() const { return whole_; }
-  template <typename Message>
-  std::optional<Message> result(Message&& message) const {
-    if (!whole_ || !rest_.empty()) return std::nullopt;
-    return std::move(message);
-  }
+  bool is_all() const { return whole_ && rest_.empty(); }
 
  private:
   std::span<const std::uint8_t> take(std::uint64_t count, std::uint64_t size) {
@@ -111,14 +107,15 @@ std::optional<Message> decode_ros1(std::span<const std::uint8_t> bytes) {
   Message message;
   message.stamp_s = from.stamp_s();
   read_fields(from, message);
-  return from.result(std::move(message));
+  if (!from.is_all()) return std::nullopt;
+  return message;
 }
 
 template <>
 std::optional<BoolMessage> decode_ros1(std::span<const std::uint8_t> bytes) {
   Bytes from(bytes);
   const BoolMessage message{from.number<std::uint8_t>() != 0};
-  return from.result(BoolMessage(message));
+  return from.is_all() ? std::optional(message) : std::nullopt;
 }
 
 template std::optional<JointMessage> decode_ros1(std::span<const std::uint8_t>);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 
 namespace lapservo::internal {
 namespace {
@@ -15,9 +16,10 @@ ros::Time time_of(double stamp_s) {
 }
 
 template <typename Type>
-Type with_stamp(double stamp_s) {
+Type with_header(double stamp_s, const std::string& frame = "") {
   Type wire;
   wire.header.stamp = time_of(stamp_s);
+  wire.header.frame_id = frame;
   return wire;
 }
 
@@ -33,7 +35,7 @@ void set(Vector& to, const Eigen::Vector3d& v) {
 }  // namespace
 
 ros1::JointState ros1_message(const JointMessage& message) {
-  auto wire = with_stamp<ros1::JointState>(message.stamp_s);
+  auto wire = with_header<ros1::JointState>(message.stamp_s);
   wire.name.assign(message.names.begin(), message.names.end());
   wire.position.assign(message.positions.begin(), message.positions.end());
   wire.velocity.assign(message.velocities.begin(), message.velocities.end());
@@ -41,7 +43,7 @@ ros1::JointState ros1_message(const JointMessage& message) {
 }
 
 ros1::Joy ros1_message(const JoyMessage& message) {
-  auto wire = with_stamp<ros1::Joy>(message.stamp_s);
+  auto wire = with_header<ros1::Joy>(message.stamp_s);
   wire.buttons.assign(message.buttons.begin(), message.buttons.end());
   return wire;
 }
@@ -53,7 +55,7 @@ ros1::Bool ros1_message(const BoolMessage& message) {
 }
 
 ros1::JointTrajectory ros1_message(const TrajectoryMessage& message) {
-  auto wire = with_stamp<ros1::JointTrajectory>(message.stamp_s);
+  auto wire = with_header<ros1::JointTrajectory>(message.stamp_s);
   wire.joint_names.assign(message.names.begin(), message.names.end());
   for (const auto& point : message.points) {
     auto& to = wire.points.emplace_back();
@@ -64,7 +66,7 @@ ros1::JointTrajectory ros1_message(const TrajectoryMessage& message) {
 }
 
 ros1::OperatingState ros1_message(const OperatingStateMessage& message) {
-  auto wire = with_stamp<ros1::OperatingState>(message.stamp_s);
+  auto wire = with_header<ros1::OperatingState>(message.stamp_s);
   wire.state = message.state;
   wire.is_homed = message.is_homed;
   wire.is_busy = message.is_busy;
@@ -72,14 +74,13 @@ ros1::OperatingState ros1_message(const OperatingStateMessage& message) {
 }
 
 ros1::StringStamped ros1_message(const StringMessage& message) {
-  auto wire = with_stamp<ros1::StringStamped>(message.stamp_s);
+  auto wire = with_header<ros1::StringStamped>(message.stamp_s);
   wire.string = message.text;
   return wire;
 }
 
 ros1::Image ros1_message(const ImageMessage& message) {
-  auto wire = with_stamp<ros1::Image>(message.stamp_s);
-  wire.header.frame_id = message.frame;
+  auto wire = with_header<ros1::Image>(message.stamp_s, message.frame);
   wire.height = message.height;
   wire.width = message.width;
   wire.encoding = message.encoding;
@@ -90,16 +91,14 @@ ros1::Image ros1_message(const ImageMessage& message) {
 }
 
 ros1::CompressedImage ros1_message(const CompressedImageMessage& message) {
-  auto wire = with_stamp<ros1::CompressedImage>(message.stamp_s);
-  wire.header.frame_id = message.frame;
+  auto wire = with_header<ros1::CompressedImage>(message.stamp_s, message.frame);
   wire.format = message.format;
   wire.data.assign(message.data.begin(), message.data.end());
   return wire;
 }
 
 ros1::CameraInfo ros1_message(const CameraInfoMessage& message) {
-  auto wire = with_stamp<ros1::CameraInfo>(message.stamp_s);
-  wire.header.frame_id = message.frame;
+  auto wire = with_header<ros1::CameraInfo>(message.stamp_s, message.frame);
   wire.height = message.height;
   wire.width = message.width;
   wire.distortion_model = "plumb_bob";
@@ -111,20 +110,15 @@ ros1::CameraInfo ros1_message(const CameraInfoMessage& message) {
 }
 
 ros1::PoseWithCovarianceStamped ros1_message(const PoseMessage& message) {
-  auto wire = with_stamp<ros1::PoseWithCovarianceStamped>(message.stamp_s);
-  wire.header.frame_id = message.frame;
-  auto& position = wire.pose.pose.position;
-  position.x = message.position_m[0], position.y = message.position_m[1], position.z = message.position_m[2];
-  auto& turn = wire.pose.pose.orientation;
-  const auto& q = message.quaternion_xyzw;
-  turn.x = q[0], turn.y = q[1], turn.z = q[2], turn.w = q[3];
+  auto wire = with_header<ros1::PoseWithCovarianceStamped>(message.stamp_s, message.frame);
+  set(wire.pose.pose.position, Eigen::Vector3d(message.position_m.data()));
+  set(wire.pose.pose.orientation, Eigen::Quaterniond(message.quaternion_xyzw.data()));
   std::copy(message.covariance.begin(), message.covariance.end(), wire.pose.covariance.begin());
   return wire;
 }
 
 ros1::PoseStamped ros1_message(const PlaceMessage& message) {
-  auto wire = with_stamp<ros1::PoseStamped>(message.stamp_s);
-  wire.header.frame_id = message.frame;
+  auto wire = with_header<ros1::PoseStamped>(message.stamp_s, message.frame);
   set(wire.pose.position, message.pose.translation);
   set(wire.pose.orientation, message.pose.rotation);
   return wire;
@@ -162,7 +156,7 @@ ros1::MarkerArray ros1_message(const CylindersMessage& message) {
 }
 
 ros1::DiagnosticArray ros1_message(const DiagnosticMessage& message) {
-  auto wire = with_stamp<ros1::DiagnosticArray>(message.stamp_s);
+  auto wire = with_header<ros1::DiagnosticArray>(message.stamp_s);
   auto& status = wire.status.emplace_back();
   status.level = static_cast<std::int8_t>(message.level);
   status.name = message.name;
@@ -176,8 +170,7 @@ ros1::DiagnosticArray ros1_message(const DiagnosticMessage& message) {
 }
 
 ros1::Observation ros1_message(const ObservationMessage& message) {
-  auto wire = with_stamp<ros1::Observation>(message.stamp_s);
-  wire.header.frame_id = message.frame;
+  auto wire = with_header<ros1::Observation>(message.stamp_s, message.frame);
   wire.instrument = message.instrument;
   wire.status = message.status;
   wire.action = message.action;

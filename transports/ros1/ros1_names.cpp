@@ -1,31 +1,13 @@
 #include "transports/ros1/ros1_names.h"
 
 #include <charconv>
-#include <cstdlib>
 
+#include "lapservo/core/environment.h"
 #include "lapservo/core/error.h"
+#include "transports/full_name.h"
 
 namespace lapservo::internal {
 namespace {
-
-bool is_letter(char c) {
-  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
-}
-bool is_digit(char c) {
-  return c >= '0' && c <= '9';
-}
-
-// Words of letters, digits and underscores, each behind one slash and beginning with a letter.
-bool is_full_name(const std::string& name) {
-  if (name.size() < 2 || name.size() > 200 || name.front() != '/' || name.back() == '/') return false;
-  char before = 0;
-  for (const char c : name) {
-    if (!is_letter(c) && !is_digit(c) && c != '_' && c != '/') return false;
-    if (before == '/' && !is_letter(c)) return false;
-    before = c;
-  }
-  return true;
-}
 
 [[noreturn]] void refuse_uri(const std::string& text) {
   throw InputError("ROS_MASTER_URI", "is " + text + ", expected http://HOST:PORT");
@@ -53,8 +35,7 @@ std::string to_string(const MasterAddress& address) {
 }
 
 std::string ros1_namespace() {
-  const char* const space = std::getenv("ROS_NAMESPACE");
-  return space ? space : "";
+  return environment("ROS_NAMESPACE");
 }
 
 std::string resolved_ros1_name(const std::string& name, const std::string& ros_namespace, const std::string& what) {
@@ -65,7 +46,7 @@ std::string resolved_ros1_name(const std::string& name, const std::string& ros_n
     if (!before.empty() && before.front() != '/') before.insert(0, "/");
     full = before + "/" + name;
   }
-  if (!is_full_name(full))
+  if (!is_full_name(full, false))
     throw InputError(
         what,
         "is " + full + ", expected words of letters, digits and _, each beginning with a letter, between slashes");

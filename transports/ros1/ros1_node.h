@@ -10,6 +10,14 @@
 
 namespace lapservo::internal {
 
+enum class MasterAnswer { yes, no, late };
+/// Queries whether the address is a master; late: no answer within 1.5 s.
+MasterAnswer ask_ros1_master(const MasterAddress& address);
+
+/// Checks that a master answers; roscpp itself would wait for it without end. Throws InputError within 2 s, naming
+/// ROS_MASTER_URI and the remedy, when nothing or something else answers.
+void require_ros1_master(const MasterAddress& address);
+
 /// This process as a node of ROS 1: one at a time, which all transports share. SIGINT stays as it is. roscpp's messages
 /// go to stderr, a line each, from warnings on.
 class Ros1Node {

@@ -148,8 +148,7 @@ class Ros1Subscription {
 
 }  // namespace lapservo::internal
 
-namespace ros {
-namespace message_traits {
+namespace ros::message_traits {
 
 template <typename Message>
 struct MD5Sum<lapservo::internal::Ros1Received<Message>> : MD5Sum<lapservo::internal::Ros1Type<Message>> {};
@@ -165,16 +164,15 @@ struct MD5Sum<lapservo::internal::Ros1Received<Message>> {
 
 template <typename Message>
 requires lapservo::internal::is_of_any_type<Message>
-struct DataType<lapservo::internal::Ros1Received<Message>> {
-  static const char* value() { return "*"; }
+struct DataType<lapservo::internal::Ros1Received<Message>> : MD5Sum<lapservo::internal::Ros1Received<Message>> {
 };
 
 template <typename Message>
 struct Definition<lapservo::internal::Ros1Received<Message>> : Definition<lapservo::internal::Ros1Type<Message>> {};
 
-}  // namespace message_traits
+}  // namespace ros::message_traits
 
-namespace serialization {
+namespace ros::serialization {
 
 template <typename Message>
 struct Serializer<lapservo::internal::Ros1Received<Message>> {
@@ -214,5 +212,4 @@ struct Serializer<lapservo::internal::Ros1Received<lapservo::internal::BoolMessa
   }
 };
 
-}  // namespace serialization
-}  // namespace ros
+}  // namespace ros::serialization

@@ -62,8 +62,9 @@ std::string full_name(const std::string& topic) {
 }
 
 template <typename Message>
-Transport::Publisher<Message> publisher(const std::shared_ptr<void>& node, const std::shared_ptr<Ros1Readers>& readers,
-                                        const std::string& topic, std::uint32_t queue_size, bool latched = false) {
+Transport::Publisher<Message> made_publisher(const std::shared_ptr<Ros1Node>& node,
+                                             const std::shared_ptr<Ros1Readers>& readers, const std::string& topic,
+                                             std::uint32_t queue_size, bool latched = false) {
   ros::AdvertiseOptions options;
   const auto peer = [](void (Ros1Readers::*tell)(const ros::SingleSubscriberPublisher&), Ros1Readers* to) {
     return [tell, to](const ros::SingleSubscriberPublisher& reader) { (to->*tell)(reader); };
@@ -74,7 +75,7 @@ Transport::Publisher<Message> publisher(const std::shared_ptr<void>& node, const
   options.callback_queue = readers->queue();
   const ros::Publisher to = ros::NodeHandle().advertise(options);
   if (!to) throw std::runtime_error("ROS: can't publish " + topic);
-  const auto end = [node = std::static_pointer_cast<Ros1Node>(node), readers](ros::Publisher* publisher) {
+  const auto end = [node, readers](ros::Publisher* publisher) {
     const std::shared_ptr<ros::Publisher> kept(publisher);
     using Both = std::pair<std::shared_ptr<ros::Publisher>, std::shared_ptr<Ros1Readers>>;
     node->end([&] { kept->shutdown(); }, std::make_shared<Both>(kept, readers));
@@ -86,10 +87,9 @@ Transport::Publisher<Message> publisher(const std::shared_ptr<void>& node, const
 }
 
 template <typename Message>
-Transport::Subscription subscription(const std::shared_ptr<void>& node, const std::string& topic,
-                                     std::uint32_t queue_size, const Transport::Handler<Message>& handler) {
-  return std::make_shared<Ros1Subscription<Message>>(std::static_pointer_cast<Ros1Node>(node), full_name(topic),
-                                                     queue_size, handler);
+Transport::Subscription made_subscription(const std::shared_ptr<Ros1Node>& node, const std::string& topic,
+                                          std::uint32_t queue_size, const Transport::Handler<Message>& handler) {
+  return std::make_shared<Ros1Subscription<Message>>(node, full_name(topic), queue_size, handler);
 }
 
 }  // namespace
@@ -105,15 +105,13 @@ std::optional<std::string> other_type_on(const std::string& topic, const std::st
 Ros1Transport::Ros1Transport(const std::string& node_name)
     : node_(Ros1Node::get(node_name)), readers_(std::make_shared<Ros1Readers>()) {}
 
-Ros1Transport::~Ros1Transport() = default;
-
 std::set<std::string> Ros1Transport::readers(const std::string& topic) const {
   return readers_->of(full_name(topic));
 }
 
 std::map<std::string, std::string> Ros1Transport::published() const {
   ros::master::V_TopicInfo topics;
-  if (!std::static_pointer_cast<Ros1Node>(node_)->answers() || !ros::master::getTopics(topics)) return {};
+  if (!node_->answers() || !ros::master::getTopics(topics)) return {};
   ros::V_string own;
   ros::this_node::getAdvertisedTopics(own);
   std::map<std::string, std::string> published;
@@ -128,25 +126,25 @@ double Ros1Transport::stamp_now_s() const {
 
 void Ros1Transport::open(const std::string& topic, AnyPublisher& made) {
   const auto make = [&]<typename Message>(Publisher<Message>& one) {
-    one = publisher<Message>(node_, readers_, topic, is_image<Message> ? newest : few, is_latched<Message>);
+    one = made_publisher<Message>(node_, readers_, topic, is_image<Message> ? newest : few, is_latched<Message>);
   };
   std::visit(make, made);
 }
 
 Transport::Publisher<JointMessage> Ros1Transport::set_point_publisher(const std::string& topic) {
-  return publisher<JointMessage>(node_, readers_, topic, 1);
+  return made_publisher<JointMessage>(node_, readers_, topic, 1);
 }
 
 Transport::Subscription Ros1Transport::listen(const std::string& topic, const AnyHandler& handler) {
   const auto subscribe = [&]<typename Message>(const Handler<Message>& one) {
-    return subscription<Message>(node_, topic, is_image<Message> ? newest : depth_of<Message>(), one);
+    return made_subscription<Message>(node_, topic, is_image<Message> ? newest : depth_of<Message>(), one);
   };
   return std::visit(subscribe, handler);
 }
 
 Transport::Subscription Ros1Transport::subscribe_commands(const std::string& topic, CommandType,
                                                           Handler<CommandMessage> handler) {
-  return subscription<CommandMessage>(node_, topic, few, handler);
+  return made_subscription<CommandMessage>(node_, topic, few, handler);
 }
 
 }  // namespace lapservo::internal

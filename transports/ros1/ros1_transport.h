@@ -9,6 +9,7 @@
 
 namespace lapservo::internal {
 
+class Ros1Node;
 class Ros1Readers;
 
 /// ROS 1 by roscpp: topics and types as ROS 1's nodes have them, at the master of ROS_MASTER_URI; ROS_NAMESPACE, ROS_IP
@@ -19,7 +20,6 @@ class Ros1Readers;
 class Ros1Transport : public Transport {
  public:
   explicit Ros1Transport(const std::string& node_name);
-  ~Ros1Transport() override;
 
   Publisher<JointMessage> set_point_publisher(const std::string& topic) override;
   Subscription subscribe_commands(const std::string& topic, CommandType type, Handler<CommandMessage> handler) override;
@@ -31,7 +31,7 @@ class Ros1Transport : public Transport {
   void open(const std::string& topic, AnyPublisher& publisher) override;
   Subscription listen(const std::string& topic, const AnyHandler& handler) override;
 
-  std::shared_ptr<void> node_;            // publishers and subscriptions keep it
+  std::shared_ptr<Ros1Node> node_;        // publishers and subscriptions keep it
   std::shared_ptr<Ros1Readers> readers_;  // publishers keep it
 };
 

@@ -15,7 +15,7 @@
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/process.h"
 #include "lapservo/testing/wait_for.h"
-#include "transports/ros1/ros1_master.h"
+#include "transports/ros1/ros1_node.h"
 #include "transports/ros1/test_ros_master.h"
 
 namespace lapservo::internal {
@@ -49,16 +49,16 @@ class Ros1Wire : public ::testing::Test {
 
 TEST_F(Ros1Wire, CarriesEveryKindOfMessageThereAndBack) {
   TestInbox<OperatingStateMessage> states;
-  const auto state_subscription = transport_->subscribe_operating_state("out/state", states.handler());
+  const auto state_subscription = transport_->subscribe<OperatingStateMessage>("out/state", states.handler());
   EXPECT_EQ(states.get([] {}).state, "DISABLED");  // said before anybody listened
   states.clear();
-  const auto say_state = transport_->operating_state_publisher("in/state");
+  const auto say_state = transport_->publisher<OperatingStateMessage>("in/state");
   expect_same(states.get([&] { say_state(sample_state); }), sample_state);
   expect_carries_each_kind(*transport_, "/in/", *transport_, "/out/");
 }
 
 TEST_F(Ros1Wire, ListsWhatOthersPublish) {
-  const auto say = transport_->joint_publisher("in/joints");
+  const auto say = transport_->publisher<JointMessage>("in/joints");
   wait_for([&] { return transport_->published().contains("/out/state"); });
   EXPECT_EQ(transport_->published().at("/out/state"), "crtk_msgs/OperatingState");
   EXPECT_FALSE(transport_->published().contains("/in/joints")) << "its own";
@@ -66,8 +66,9 @@ TEST_F(Ros1Wire, ListsWhatOthersPublish) {
 
 TEST_F(Ros1Wire, KnowsWhoReads) {
   using Names = std::set<std::string>;
-  const auto say = transport_->set_point_publisher("/in/joints"), alone = transport_->joint_publisher("/nobody");
-  const auto own = transport_->subscribe_joints("/in/joints", [](JointMessage&&) {});
+  const auto say = transport_->set_point_publisher("/in/joints"),
+             alone = transport_->publisher<JointMessage>("/nobody");
+  const auto own = transport_->subscribe<JointMessage>("/in/joints", [](JointMessage&&) {});
   const auto become = [&](const Names& names) {
     return wait_for([&] { return transport_->readers("in/joints") == names; });
   };
@@ -81,8 +82,9 @@ TEST_F(Ros1Wire, KnowsWhoReads) {
 
 TEST_F(Ros1Wire, HearsOthersOnItsOwnTopicButNotItself) {
   TestInbox<JointMessage> heard;
-  const auto subscription = transport_->subscribe_joints("/out/joints", heard.handler());
-  const auto say = transport_->joint_publisher("/out/joints"), ask = transport_->joint_publisher("/in/joints");
+  const auto subscription = transport_->subscribe<JointMessage>("/out/joints", heard.handler());
+  const auto say = transport_->publisher<JointMessage>("/out/joints"),
+             ask = transport_->publisher<JointMessage>("/in/joints");
   heard.get([&] {
     say({stamp_s, {}, {1}});
     ask({stamp_s, {}, {2}});
@@ -102,8 +104,8 @@ TEST_F(Ros1Wire, HearsCommandsOfAnyTypeButNotItself) {
   const auto trajectory_subscription =
       transport_->subscribe_commands("/out/trajectory", nothing, trajectories.handler());
   const auto own_subscription = transport_->subscribe_commands("/in/joints", nothing, own.handler());
-  const auto say_joints = transport_->joint_publisher("/in/joints");
-  const auto say_trajectory = transport_->trajectory_publisher("/in/trajectory");
+  const auto say_joints = transport_->publisher<JointMessage>("/in/joints");
+  const auto say_trajectory = transport_->publisher<TrajectoryMessage>("/in/trajectory");
   joints.get([&] { say_joints({stamp_s, {}, {1}}); });
   trajectories.get([&] { say_trajectory({stamp_s, {}, {}}); });
   EXPECT_TRUE(own.empty());
@@ -111,18 +113,18 @@ TEST_F(Ros1Wire, HearsCommandsOfAnyTypeButNotItself) {
 
 TEST_F(Ros1Wire, NoTopicWaitsForAnother) {
   std::atomic<bool> release = false, blocked = false;
-  const auto slow = transport_->subscribe_strings("/out/text", [&](StringMessage&&) {
+  const auto slow = transport_->subscribe<StringMessage>("/out/text", [&](StringMessage&&) {
     blocked = true;
     while (!release) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   });
-  const auto ask = transport_->string_publisher("/in/text");
+  const auto ask = transport_->publisher<StringMessage>("/in/text");
   ASSERT_TRUE(wait_for([&] {
     ask({stamp_s, "x"});
     return blocked.load();
   }));
   TestInbox<JointMessage> joints;
-  const auto subscription = transport_->subscribe_joints("/out/joints", joints.handler());
-  const auto say = transport_->joint_publisher("/in/joints");
+  const auto subscription = transport_->subscribe<JointMessage>("/out/joints", joints.handler());
+  const auto say = transport_->publisher<JointMessage>("/in/joints");
   EXPECT_EQ(joints.get([&] { say({stamp_s, {}, {1}}); }).positions, std::vector<double>{1});
   release = true;
 }
@@ -132,7 +134,7 @@ TEST_F(Ros1Wire, AStopIsHeardThoughAnotherFloodsItsTopic) {
   const testing::Process flooder(LAPSERVO_ROS1_PEER, {"flooder"});
   std::atomic<bool> release = false, found = false, stopped = false;
   std::atomic<int> floods = 0;
-  const auto subscription = transport_->subscribe_strings("/out/text", [&](StringMessage&& message) {
+  const auto subscription = transport_->subscribe<StringMessage>("/out/text", [&](StringMessage&& message) {
     if (message.text == "flooder") {
       found = true;
       while (!release) std::this_thread::sleep_for(std::chrono::milliseconds(1));
@@ -140,7 +142,7 @@ TEST_F(Ros1Wire, AStopIsHeardThoughAnotherFloodsItsTopic) {
     if (message.text == "stop") stopped = true;
     if (message.text == "flood") ++floods;
   });
-  const auto ask = transport_->string_publisher("/in/text");
+  const auto ask = transport_->publisher<StringMessage>("/in/text");
   ASSERT_TRUE(wait_for([&] {
     ask({stamp_s, "who"});
     return found.load();
@@ -155,11 +157,11 @@ TEST_F(Ros1Wire, AStopIsHeardThoughAnotherFloodsItsTopic) {
 TEST_F(Ros1Wire, StrangersMessagesAreDroppedAndTold) {
   ::testing::internal::CaptureStderr();
   TestInbox<JointMessage> odd, pretended;
-  const auto odd_subscription = transport_->subscribe_joints("/out/odd", odd.handler());
-  const auto pretended_subscription = transport_->subscribe_joints("/out/pretender", pretended.handler());
+  const auto odd_subscription = transport_->subscribe<JointMessage>("/out/odd", odd.handler());
+  const auto pretended_subscription = transport_->subscribe<JointMessage>("/out/pretender", pretended.handler());
   TestInbox<StringMessage> echo;
-  const auto echo_subscription = transport_->subscribe_strings("/out/text", echo.handler());
-  const auto ask = transport_->string_publisher("/in/text");
+  const auto echo_subscription = transport_->subscribe<StringMessage>("/out/text", echo.handler());
+  const auto ask = transport_->publisher<StringMessage>("/in/text");
   for (int i = 0; i < 4; ++i) {
     echo.clear();
     echo.get([&] { ask({stamp_s, "pretend"}); });
@@ -179,8 +181,8 @@ TEST_F(Ros1Wire, StrangersMessagesAreDroppedAndTold) {
 // Connections survive the master's death; a publisher that dies falls silent, and is heard when it is back.
 TEST_F(Ros1Wire, OutlivesMasterAndPeer) {
   TestInbox<JointMessage> joints;
-  const auto subscription = transport_->subscribe_joints("/out/joints", joints.handler());
-  const auto say = transport_->joint_publisher("/in/joints");
+  const auto subscription = transport_->subscribe<JointMessage>("/out/joints", joints.handler());
+  const auto say = transport_->publisher<JointMessage>("/in/joints");
   const auto hear = [&] { joints.get([&] { say({stamp_s, {}, {1}}); }); };
   hear();
   peer_ = nullptr;
@@ -196,10 +198,10 @@ TEST_F(Ros1Wire, OutlivesMasterAndPeer) {
 // Last: what could not be unregistered stays for the rest of this process.
 TEST_F(Ros1Wire, EndsThoughItsMasterHangs) {
   TestInbox<JointMessage> joints;
-  auto subscription = transport_->subscribe_joints("/out/joints", joints.handler());
-  auto say = transport_->joint_publisher("/in/joints");
+  auto subscription = transport_->subscribe<JointMessage>("/out/joints", joints.handler());
+  auto say = transport_->publisher<JointMessage>("/in/joints");
   joints.get([&] { say({stamp_s, {}, {1}}); });
-  auto lonely = transport_->subscribe_joints("/nobody", joints.handler());
+  auto lonely = transport_->subscribe<JointMessage>("/nobody", joints.handler());
   master_.stop();
   std::this_thread::sleep_for(std::chrono::milliseconds(1200));  // roscpp queries the master for such a topic
   const auto begin = std::chrono::steady_clock::now();

@@ -76,22 +76,22 @@ int main(int argc, char** argv) {
     const auto say = (transport.*publisher)("/out/" + kind);
     subscriptions.push_back((transport.*subscribe)("/in/" + kind, [say](auto&& message) { say(message); }));
   };
-  echo("joints", &Transport::joint_publisher, &Transport::subscribe_joints);
-  echo("bool", &Transport::bool_publisher, &Transport::subscribe_buttons);
-  echo("trajectory", &Transport::trajectory_publisher, &Transport::subscribe_trajectories);
-  echo("image", &Transport::image_publisher, &Transport::subscribe_images);
-  echo("compressed", &Transport::compressed_image_publisher, &Transport::subscribe_compressed_images);
-  echo("place", &Transport::place_publisher, &Transport::subscribe_places);
-  const auto state = transport.operating_state_publisher("/out/state");
+  echo("joints", &Transport::publisher<JointMessage>, &Transport::subscribe<JointMessage>);
+  echo("bool", &Transport::publisher<BoolMessage>, &Transport::subscribe<BoolMessage>);
+  echo("trajectory", &Transport::publisher<TrajectoryMessage>, &Transport::subscribe<TrajectoryMessage>);
+  echo("image", &Transport::publisher<ImageMessage>, &Transport::subscribe<ImageMessage>);
+  echo("compressed", &Transport::publisher<CompressedImageMessage>, &Transport::subscribe<CompressedImageMessage>);
+  echo("place", &Transport::publisher<PlaceMessage>, &Transport::subscribe<PlaceMessage>);
+  const auto state = transport.publisher<OperatingStateMessage>("/out/state");
   state({1700000000, "DISABLED", false, false});  // before anybody listens: it is latched
   subscriptions.push_back(
-      transport.subscribe_operating_state("/in/state", [&](OperatingStateMessage&& m) { state(m); }));
-  const auto joy = transport.joy_publisher("/out/joy");
-  subscriptions.push_back(transport.subscribe_buttons("/in/joy", [&](BoolMessage&& m) { joy({0, {m.value}}); }));
-  const auto odd = transport.image_publisher("/out/odd");
+      transport.subscribe<OperatingStateMessage>("/in/state", [&](OperatingStateMessage&& m) { state(m); }));
+  const auto joy = transport.publisher<JoyMessage>("/out/joy");
+  subscriptions.push_back(transport.subscribe<BoolMessage>("/in/joy", [&](BoolMessage&& m) { joy({0, {m.value}}); }));
+  const auto odd = transport.publisher<ImageMessage>("/out/odd");
   ros::Publisher pretender = ros::NodeHandle().advertise<Pretender>("/out/pretender", 10);
-  const auto text = transport.string_publisher("/out/text");
-  subscriptions.push_back(transport.subscribe_strings("/in/text", [&](StringMessage&& m) {
+  const auto text = transport.publisher<StringMessage>("/out/text");
+  subscriptions.push_back(transport.subscribe<StringMessage>("/in/text", [&](StringMessage&& m) {
     if (m.text == "pretend") {
       pretender.publish(Pretender{std::vector<std::uint8_t>(40, 0xff)});
       pretender.publish(Pretender{});

@@ -14,7 +14,7 @@
 #include "lapservo/core/error.h"
 #include "lapservo/testing/process.h"
 #include "lapservo/testing/temporary_folder.h"
-#include "transports/ros1/ros1_master.h"
+#include "transports/ros1/ros1_node.h"
 
 namespace lapservo::internal {
 

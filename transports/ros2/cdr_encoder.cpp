@@ -13,6 +13,14 @@ static_assert(std::endian::native == std::endian::little, "encode_cdr() writes n
 // Puts values behind one another, each at a multiple of its size from the end of the encapsulation on.
 class CdrWriter {
  public:
+  // Begins with a std_msgs/Header.
+  explicit CdrWriter(double stamp_s) {
+    const double whole_s = std::floor(stamp_s);
+    const auto nanosec = std::llround(1e9 * (stamp_s - whole_s));
+    number(static_cast<std::int32_t>(whole_s + (nanosec == 1000000000 ? 1 : 0)));
+    number(static_cast<std::uint32_t>(nanosec % 1000000000));
+    text("");  // frame_id
+  }
   template <typename T>
   void number(T value) {
     align(sizeof(T));
@@ -34,14 +42,6 @@ class CdrWriter {
     align(sizeof(T));
     put(values.data(), values.size() * sizeof(T));
   }
-  // A std_msgs/Header.
-  void header(double stamp_s, const std::string& frame) {
-    const double whole_s = std::floor(stamp_s);
-    const auto nanosec = std::llround(1e9 * (stamp_s - whole_s));
-    number(static_cast<std::int32_t>(whole_s + (nanosec == 1000000000 ? 1 : 0)));
-    number(static_cast<std::uint32_t>(nanosec % 1000000000));
-    text(frame);
-  }
   std::vector<std::uint8_t> take() { return std::move(bytes_); }
 
  private:
@@ -61,8 +61,7 @@ class CdrWriter {
 }  // namespace
 
 std::vector<std::uint8_t> encode_cdr(const JointMessage& message) {
-  CdrWriter cdr;
-  cdr.header(message.stamp_s, "");
+  CdrWriter cdr(message.stamp_s);
   cdr.texts(message.names);
   cdr.numbers(message.positions);
   cdr.numbers(std::vector<double>());  // velocities
@@ -71,8 +70,7 @@ std::vector<std::uint8_t> encode_cdr(const JointMessage& message) {
 }
 
 std::vector<std::uint8_t> encode_cdr(const ImageMessage& message) {
-  CdrWriter cdr;
-  cdr.header(message.stamp_s, "");
+  CdrWriter cdr(message.stamp_s);
   cdr.number(message.height);
   cdr.number(message.width);
   cdr.text(message.encoding);
@@ -83,8 +81,7 @@ std::vector<std::uint8_t> encode_cdr(const ImageMessage& message) {
 }
 
 std::vector<std::uint8_t> encode_cdr(const CompressedImageMessage& message) {
-  CdrWriter cdr;
-  cdr.header(message.stamp_s, "");
+  CdrWriter cdr(message.stamp_s);
   cdr.text(message.format);
   cdr.numbers(message.data);
   return cdr.take();

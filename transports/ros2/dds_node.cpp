@@ -4,7 +4,6 @@
 #include <array>
 #include <atomic>
 #include <cstdio>
-#include <cstdlib>
 #include <cstring>
 #include <map>
 #include <memory>
@@ -12,6 +11,7 @@
 
 #include <fmt/format.h>
 
+#include "lapservo/core/environment.h"
 #include "ros2_messages.h"
 #include "transports/ros2/discovery.h"
 #include "transports/ros2/ros2_names.h"
@@ -24,10 +24,12 @@ dds_entity_t checked(dds_entity_t entity, const char* what) {
   return entity;
 }
 
-struct DeleteQos {
-  void operator()(dds_qos_t* qos) const { dds_delete_qos(qos); }
+template <auto end>
+struct EndedBy {
+  void operator()(auto* owned) const { end(owned); }
 };
-using Qos = std::unique_ptr<dds_qos_t, DeleteQos>;
+using Qos = std::unique_ptr<dds_qos_t, EndedBy<dds_delete_qos>>;
+using Listener = std::unique_ptr<dds_listener_t, EndedBy<dds_delete_listener>>;
 
 Qos qos_of(Delivery delivery) {
   Qos qos(dds_create_qos());
@@ -42,11 +44,6 @@ Qos qos_of(Delivery delivery) {
   const dds_data_representation_id_t xcdr1 = DDS_DATA_REPRESENTATION_XCDR1;
   dds_qset_data_representation(qos.get(), 1, &xcdr1);
   return qos;
-}
-
-std::string environment(const char* name) {
-  const char* const value = std::getenv(name);
-  return value ? value : "";
 }
 
 const char* text_of(std::uint32_t policy) {
@@ -75,11 +72,6 @@ void say_requested(dds_entity_t, dds_requested_incompatible_qos_status_t status,
   std::fprintf(stderr, "DDS: %s: a publisher offers another %s than can be read, and is not heard\n",
                static_cast<const std::string*>(topic)->c_str(), text_of(status.last_policy_id));
 }
-
-struct DeleteListener {
-  void operator()(dds_listener_t* listener) const { dds_delete_listener(listener); }
-};
-using Listener = std::unique_ptr<dds_listener_t, DeleteListener>;
 
 // CYCLONEDDS_URI comes last and overrides the rest.
 std::string configuration() {
@@ -142,13 +134,14 @@ class Announcement {
       : readers_(gids(readers)), writers_(gids(writers)) {
     node_.node_namespace_[0] = '/';
     name.copy(node_.node_name_, sizeof node_.node_name_ - 1);
-    node_.reader_gid_seq_._length = node_.reader_gid_seq_._maximum = static_cast<std::uint32_t>(readers_.size());
-    node_.reader_gid_seq_._buffer = readers_.data();
-    node_.writer_gid_seq_._length = node_.writer_gid_seq_._maximum = static_cast<std::uint32_t>(writers_.size());
-    node_.writer_gid_seq_._buffer = writers_.data();
+    const auto point = [](auto& sequence, auto* items, std::size_t count) {
+      sequence._length = sequence._maximum = static_cast<std::uint32_t>(count);
+      sequence._buffer = items;
+    };
+    point(node_.reader_gid_seq_, readers_.data(), readers_.size());
+    point(node_.writer_gid_seq_, writers_.data(), writers_.size());
     info_.gid_ = gid(participant);
-    info_.node_entities_info_seq_._length = info_.node_entities_info_seq_._maximum = 1;
-    info_.node_entities_info_seq_._buffer = &node_;
+    point(info_.node_entities_info_seq_, &node_, 1);
   }
   Announcement(const Announcement&) = delete;
   Announcement& operator=(const Announcement&) = delete;

@@ -53,12 +53,12 @@ std::vector<int> range(int first, int last) {
 
 // Bursts of two to five messages by a writer of another participant, the next one when the last one came.
 template <typename Message>
-void expect_order(Delivery offered, auto subscribe, Message (*numbered)(int)) {
+void expect_order(Delivery offered, Message (*numbered)(int)) {
   constexpr int bursts = 1000;
   Ros2Transport to("to");
   const auto from = node_elsewhere();
   TestInbox<Message> heard;
-  const auto subscription = (to.*subscribe)(topic, heard.handler());
+  const auto subscription = to.subscribe<Message>(topic, heard.handler());
   const dds_entity_t writer = from->create_writer(topic, Wire<Message>::descriptor(), offered);
   heard.get([&] { Wire<Message>::write(writer, numbered(0)); });
   std::this_thread::sleep_for(std::chrono::milliseconds(50));
@@ -75,13 +75,13 @@ void expect_order(Delivery offered, auto subscribe, Message (*numbered)(int)) {
 
 TEST(Reading, StatesComeOnceInTheirOrderByWhateverTheirPublisherOffers) {
   for (const Delivery offered : {Delivery::latched, Delivery::reliable, Delivery::best_effort})
-    expect_order(offered, &Transport::subscribe_operating_state, state);
+    expect_order(offered, state);
 }
 
 TEST(Reading, CommandsAndTrajectoriesComeOnceInTheirOrderByWhateverTheirPublisherOffers) {
   for (const Delivery offered : {Delivery::latched, Delivery::reliable, Delivery::best_effort}) {
-    expect_order(offered, &Transport::subscribe_strings, text);
-    expect_order(offered, &Transport::subscribe_trajectories, trajectory);
+    expect_order(offered, text);
+    expect_order(offered, trajectory);
   }
 }
 
@@ -90,7 +90,7 @@ TEST(Reading, WhatAWriterSaidBeforeItWentComesOnceInItsOrder) {
   Ros2Transport to("to");
   const auto from = node_elsewhere();
   TestInbox<OperatingStateMessage> heard;
-  const auto subscription = to.subscribe_operating_state(topic, heard.handler());
+  const auto subscription = to.subscribe<OperatingStateMessage>(topic, heard.handler());
   const auto& type = Wire<OperatingStateMessage>::descriptor();
   int said = 0;
   for (int round = 0; round < 20; ++round) {
@@ -109,7 +109,7 @@ TEST(Reading, AStopIsHeardThoughAnotherFloodsItsTopic) {
   constexpr int stops = 10, others = 1000;
   Ros2Transport to("to");
   std::atomic<int> last = 0;
-  const auto subscription = to.subscribe_strings(topic, [&](StringMessage&& message) {
+  const auto subscription = to.subscribe<StringMessage>(topic, [&](StringMessage&& message) {
     if (const int number = number_of(message); number > 0) last = number;
   });
   const auto from = node_elsewhere(), other = node_elsewhere();

@@ -4,34 +4,13 @@
 #include <utility>
 
 #include "lapservo/core/error.h"
+#include "transports/full_name.h"
 
 namespace lapservo::internal {
-namespace {
-
-bool is_letter(char c) {
-  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_';
-}
-bool is_digit(char c) {
-  return c >= '0' && c <= '9';
-}
-
-// Words of letters, digits and underscores between single slashes, none beginning with a digit.
-bool is_topic(const std::string& name) {
-  if (name.size() < 2 || name.size() > 200 || name.back() == '/') return false;
-  char before = 0;
-  for (const char c : name) {
-    if (!is_letter(c) && !is_digit(c) && c != '/') return false;
-    if (before == '/' && !is_letter(c)) return false;
-    before = c;
-  }
-  return true;
-}
-
-}  // namespace
 
 std::string dds_topic_name(const std::string& topic) {
   const std::string name = !topic.empty() && topic.front() == '/' ? topic : "/" + topic;
-  if (!is_topic(name))
+  if (!is_full_name(name, true))
     throw InputError("topic", "is " + topic + ", expected names of letters, digits and _ between slashes");
   return "rt" + name;
 }

@@ -1,6 +1,5 @@
 #include "transports/ros2/ros2_transport.h"
 
-#include <cstdlib>
 #include <functional>
 #include <map>
 #include <optional>
@@ -10,6 +9,7 @@
 #include <variant>
 #include <vector>
 
+#include "lapservo/core/environment.h"
 #include "lapservo/core/wall_clock.h"
 #include "transports/ros2/dds_node.h"
 #include "transports/ros2/reading.h"
@@ -18,11 +18,6 @@
 
 namespace lapservo::internal {
 namespace {
-
-std::uint32_t domain_of_environment() {
-  const char* const id = std::getenv("ROS_DOMAIN_ID");
-  return domain_id(id ? id : "");
-}
 
 // DDS matches each reader with the publishers of its type.
 std::vector<const dds_topic_descriptor_t*> types_of(CommandType command) {
@@ -67,60 +62,37 @@ std::optional<int> depth_of() {
   return std::nullopt;
 }
 
+template <typename Message>
+Transport::Publisher<Message> made_publisher(const std::shared_ptr<DdsNode>& node, const std::string& topic,
+                                             Delivery delivery) {
+  const dds_entity_t writer = node->create_writer(topic, Wire<Message>::descriptor(), delivery);
+  const std::shared_ptr<void> end(nullptr, [node, writer](void*) { node->remove(writer); });
+  return [writer, end](const Message& message) { Wire<Message>::write(writer, message); };
+}
+
+template <typename Message>
+Transport::Subscription made_subscription(const std::shared_ptr<DdsNode>& node, const std::string& topic,
+                                          const Transport::Handler<Message>& handler) {
+  const auto taken = [handler](const void* wire, dds_instance_handle_t writer) {
+    Message message = Wire<Message>::read(*static_cast<const typename Wire<Message>::Type*>(wire));
+    if constexpr (requires { message.source; }) message.source = writer;
+    handler(std::move(message));
+  };
+  return std::make_shared<Reading>(node, topic, Wire<Message>::descriptor(), deliveries_of<Message>(),
+                                   depth_of<Message>(), taken);
+}
+
 }  // namespace
 
-class Ros2Transport::Implementation {
- public:
-  explicit Implementation(const std::string& node_name)
-      : node_(std::make_shared<DdsNode>(node_name, domain_of_environment())) {}
-
-  std::map<std::string, std::string> published() const { return node_->published(); }
-
-  std::set<std::string> readers(const std::string& topic) const { return node_->readers(topic); }
-
-  template <typename Message>
-  Publisher<Message> publisher(const std::string& topic, Delivery delivery) {
-    const dds_entity_t writer = node_->create_writer(topic, Wire<Message>::descriptor(), delivery);
-    const std::shared_ptr<void> end(nullptr, [node = node_, writer](void*) { node->remove(writer); });
-    return [writer, end](const Message& message) { Wire<Message>::write(writer, message); };
-  }
-
-  template <typename Message>
-  Subscription subscribe(const std::string& topic, const std::vector<Delivery>& deliveries,
-                         const Handler<Message>& handler) {
-    using Type = typename Wire<Message>::Type;
-    const auto taken = [handler](const void* wire, dds_instance_handle_t writer) {
-      Message message = Wire<Message>::read(*static_cast<const Type*>(wire));
-      if constexpr (requires { message.source; }) message.source = writer;
-      handler(std::move(message));
-    };
-    return std::make_shared<Reading>(node_, topic, Wire<Message>::descriptor(), deliveries, depth_of<Message>(), taken);
-  }
-
-  Subscription subscribe_commands(const std::string& topic, CommandType type, const Handler<CommandMessage>& handler) {
-    const auto taken = [handler](const void*, dds_instance_handle_t) { handler(CommandMessage()); };
-    auto readings = std::make_shared<std::vector<std::unique_ptr<Reading>>>();
-    for (const dds_topic_descriptor_t* descriptor : types_of(type))
-      readings->push_back(std::make_unique<Reading>(
-          node_, topic, *descriptor, std::vector{Delivery::reliable, Delivery::best_effort}, std::nullopt, taken));
-    return readings;
-  }
-
- private:
-  std::shared_ptr<DdsNode> node_;
-};
-
 Ros2Transport::Ros2Transport(const std::string& node_name)
-    : implementation_(std::make_shared<Implementation>(node_name)) {}
-
-Ros2Transport::~Ros2Transport() = default;
+    : node_(std::make_shared<DdsNode>(node_name, domain_id(environment("ROS_DOMAIN_ID")))) {}
 
 std::set<std::string> Ros2Transport::readers(const std::string& topic) const {
-  return implementation_->readers(topic);
+  return node_->readers(topic);
 }
 
 std::map<std::string, std::string> Ros2Transport::published() const {
-  return implementation_->published();
+  return node_->published();
 }
 
 double Ros2Transport::stamp_now_s() const {
@@ -129,20 +101,21 @@ double Ros2Transport::stamp_now_s() const {
 
 void Ros2Transport::open(const std::string& topic, AnyPublisher& publisher) {
   const auto make = [&]<typename Message>(Publisher<Message>& one) {
-    one = implementation_->publisher<Message>(topic, is_latched<Message> ? Delivery::latched
-                                                     : is_image<Message> ? Delivery::best_effort
-                                                                         : Delivery::reliable);
+    one = made_publisher<Message>(node_, topic,
+                                  is_latched<Message> ? Delivery::latched
+                                  : is_image<Message> ? Delivery::best_effort
+                                                      : Delivery::reliable);
   };
   std::visit(make, publisher);
 }
 
 Transport::Publisher<JointMessage> Ros2Transport::set_point_publisher(const std::string& topic) {
-  return implementation_->publisher<JointMessage>(topic, Delivery::set_point);
+  return made_publisher<JointMessage>(node_, topic, Delivery::set_point);
 }
 
 Transport::Subscription Ros2Transport::listen(const std::string& topic, const AnyHandler& handler) {
   const auto subscribe = [&]<typename Message>(const Handler<Message>& one) {
-    return implementation_->subscribe<Message>(topic, deliveries_of<Message>(), one);
+    return made_subscription<Message>(node_, topic, one);
   };
   const auto* const buttons = std::get_if<Handler<BoolMessage>>(&handler);
   if (!buttons) return std::visit(subscribe, handler);
@@ -152,7 +125,12 @@ Transport::Subscription Ros2Transport::listen(const std::string& topic, const An
 
 Transport::Subscription Ros2Transport::subscribe_commands(const std::string& topic, CommandType type,
                                                           Handler<CommandMessage> handler) {
-  return implementation_->subscribe_commands(topic, type, handler);
+  const auto taken = [handler](const void*, dds_instance_handle_t) { handler(CommandMessage()); };
+  auto readings = std::make_shared<std::vector<std::unique_ptr<Reading>>>();
+  for (const dds_topic_descriptor_t* descriptor : types_of(type))
+    readings->push_back(std::make_unique<Reading>(
+        node_, topic, *descriptor, std::vector{Delivery::reliable, Delivery::best_effort}, std::nullopt, taken));
+  return readings;
 }
 
 }  // namespace lapservo::internal

@@ -28,17 +28,17 @@ constexpr double stamp_s = sample_stamp_s;
 TEST(Ros2Transport, CarriesEveryKindOfMessage) {
   Ros2Transport from("from"), to("to");
   TestInbox<OperatingStateMessage> states;
-  const auto say_state = from.operating_state_publisher("PSM1/operating_state");
+  const auto say_state = from.publisher<OperatingStateMessage>("PSM1/operating_state");
   say_state(sample_state);  // before anybody listens: it is latched
-  const auto subscription = to.subscribe_operating_state("/PSM1/operating_state", states.handler());
+  const auto subscription = to.subscribe<OperatingStateMessage>("/PSM1/operating_state", states.handler());
   expect_same(states.get([] {}), sample_state);
   expect_carries_each_kind(from, "/PSM1/", to, "/PSM1/");
 }
 
 TEST(Ros2Transport, ListsWhatOthersPublish) {
   Ros2Transport one("one"), other("other");
-  const auto joints = one.joint_publisher("/PSM1/measured_js");
-  const auto images = other.image_publisher("endoscope/image_raw");
+  const auto joints = one.publisher<JointMessage>("/PSM1/measured_js");
+  const auto images = other.publisher<ImageMessage>("endoscope/image_raw");
   testing::wait_for([&] { return one.published().contains("/endoscope/image_raw"); });
   const auto published = one.published();
   EXPECT_EQ(published.at("/endoscope/image_raw"), "sensor_msgs/msg/Image");
@@ -49,14 +49,15 @@ TEST(Ros2Transport, ListsWhatOthersPublish) {
 TEST(Ros2Transport, KnowsWhoReads) {
   using Names = std::set<std::string>;
   Ros2Transport own("own");
-  const auto says = own.set_point_publisher("/PSM1/servo_jp"), elsewhere = own.joint_publisher("/PSM2/servo_jp");
-  const auto subscription = own.subscribe_joints("/PSM1/servo_jp", [](JointMessage&&) {});
+  const auto says = own.set_point_publisher("/PSM1/servo_jp"),
+             elsewhere = own.publisher<JointMessage>("/PSM2/servo_jp");
+  const auto subscription = own.subscribe<JointMessage>("/PSM1/servo_jp", [](JointMessage&&) {});
   EXPECT_EQ(own.readers("/PSM1/servo_jp"), Names());
   const auto become = [&](const Names& names) {
     return testing::wait_for([&] { return own.readers("/PSM1/servo_jp") == names; });
   };
   auto arm = std::make_unique<Ros2Transport>("arm");
-  const auto subscribe = [](Ros2Transport& to) { return to.subscribe_joints("PSM1/servo_jp", [](JointMessage&&) {}); };
+  const auto subscribe = [](Ros2Transport& to) { return to.subscribe<JointMessage>("PSM1/servo_jp", [](auto&&) {}); };
   auto first = subscribe(*arm), second = subscribe(*arm);
   EXPECT_TRUE(become({"/arm"}));
   const auto restarted = std::make_unique<Ros2Transport>("arm");
@@ -126,9 +127,9 @@ TEST(Ros2Transport, ACommandThatIsSaidOnceIsHeardOnce) {
 TEST(Ros2Transport, DoesNotHearItself) {
   Ros2Transport one("one"), other("other");
   TestInbox<JointMessage> own, others;
-  const auto own_subscription = one.subscribe_joints("/PSM1/servo_jp", own.handler());
-  const auto others_subscription = other.subscribe_joints("/PSM1/servo_jp", others.handler());
-  const auto say = one.joint_publisher("/PSM1/servo_jp");
+  const auto own_subscription = one.subscribe<JointMessage>("/PSM1/servo_jp", own.handler());
+  const auto others_subscription = other.subscribe<JointMessage>("/PSM1/servo_jp", others.handler());
+  const auto say = one.publisher<JointMessage>("/PSM1/servo_jp");
   others.get([&] { say({stamp_s, {}, {1}}); });
   EXPECT_TRUE(own.empty());
 }
@@ -178,8 +179,8 @@ TEST(Ros2Transport, NoSetPointIsDeliveredWhenItIsOld) {
 TEST(Ros2Transport, PeersWhoseQualityOfServiceDoesNotFitAreSaid) {
   ::testing::internal::CaptureStderr();
   Ros2Transport own("own");
-  const auto images = own.image_publisher("/endoscope/image_raw");
-  const auto joints = own.subscribe_joints("/PSM1/measured_js", [](JointMessage&&) {});
+  const auto images = own.publisher<ImageMessage>("/endoscope/image_raw");
+  const auto joints = own.subscribe<JointMessage>("/PSM1/measured_js", [](JointMessage&&) {});
   DdsNode other("other", test_domain());
   for (int k = 0; k < 2; ++k)
     other.create_reader("/endoscope/image_raw", Wire<ImageMessage>::descriptor(), Delivery::reliable);
@@ -200,8 +201,8 @@ TEST(Ros2Transport, AStateThatWasSaidOnceByAVolatilePublisherIsMissed) {
     Wire<OperatingStateMessage>::write(writer, {stamp_s, "ENABLED", true, false});
   }
   TestInbox<OperatingStateMessage> lost, kept;
-  const auto volatile_one = to.subscribe_operating_state("/PSM1/operating_state", lost.handler());
-  const auto latched_one = to.subscribe_operating_state("/PSM2/operating_state", kept.handler());
+  const auto volatile_one = to.subscribe<OperatingStateMessage>("/PSM1/operating_state", lost.handler());
+  const auto latched_one = to.subscribe<OperatingStateMessage>("/PSM2/operating_state", kept.handler());
   std::this_thread::sleep_for(std::chrono::seconds(3));
   const std::string said = ::testing::internal::GetCapturedStderr();
   EXPECT_TRUE(lost.empty());
@@ -217,7 +218,7 @@ TEST(Ros2Transport, CommandsAreHeardWhateverTheSendersClockSays) {
   Ros2Transport to("to");
   DdsNode from("from", test_domain());
   TestInbox<StringMessage> commands;
-  const auto subscription = to.subscribe_strings("/lapservo/PSM1/command", commands.handler());
+  const auto subscription = to.subscribe<StringMessage>("/lapservo/PSM1/command", commands.handler());
   const dds_entity_t writer =
       from.create_writer("/lapservo/PSM1/command", Wire<StringMessage>::descriptor(), Delivery::reliable);
   static char text[] = "stop";
@@ -253,13 +254,13 @@ TEST(Ros2Transport, WhatItTellsOfTheLoopArrivesAsItsType) {
       return taken;
     });
   };
-  EXPECT_TRUE(arrives("/pose", from.pose_publisher("/pose")));
-  EXPECT_TRUE(arrives("/tf", from.transform_publisher("/tf")));
-  EXPECT_TRUE(arrives("/tf_static", from.static_transform_publisher("/tf_static")));
-  EXPECT_TRUE(arrives("/markers", from.cylinder_publisher("/markers")));
-  EXPECT_TRUE(arrives("/diagnostics", from.diagnostic_publisher("/diagnostics")));
-  EXPECT_TRUE(arrives("/seen", from.observation_publisher("/seen")));
-  EXPECT_TRUE(arrives("/camera_info", from.camera_info_publisher("/camera_info")));
+  EXPECT_TRUE(arrives("/pose", from.publisher<PoseMessage>("/pose")));
+  EXPECT_TRUE(arrives("/tf", from.publisher<TransformsMessage>("/tf")));
+  EXPECT_TRUE(arrives("/tf_static", from.publisher<StaticTransformsMessage>("/tf_static")));
+  EXPECT_TRUE(arrives("/markers", from.publisher<CylindersMessage>("/markers")));
+  EXPECT_TRUE(arrives("/diagnostics", from.publisher<DiagnosticMessage>("/diagnostics")));
+  EXPECT_TRUE(arrives("/seen", from.publisher<ObservationMessage>("/seen")));
+  EXPECT_TRUE(arrives("/camera_info", from.publisher<CameraInfoMessage>("/camera_info")));
 }
 
 TEST(Ros2Transport, AStampThatIsNoneIsNotANumber) {

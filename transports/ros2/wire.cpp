@@ -14,6 +14,11 @@ namespace {
 char* pointer(const std::string& text) {
   return const_cast<char*>(text.c_str());
 }
+std::vector<char*> pointers(const std::vector<std::string>& texts) {
+  std::vector<char*> all;
+  for (const std::string& text : texts) all.push_back(pointer(text));
+  return all;
+}
 template <typename Sequence, typename T>
 void point(Sequence& sequence, const std::vector<T>& values) {
   sequence._length = sequence._maximum = static_cast<std::uint32_t>(values.size());
@@ -33,11 +38,10 @@ Time time_of(double stamp_s) {
 }
 
 template <typename Type>
-Type with_header(double stamp_s) {
-  static char no_frame[1] = "";
+Type with_header(double stamp_s, const char* frame = "") {
   Type wire{};
   wire.header_.stamp_ = time_of(stamp_s);
-  wire.header_.frame_id_ = no_frame;
+  wire.header_.frame_id_ = const_cast<char*>(frame);
   return wire;
 }
 
@@ -53,10 +57,6 @@ template <typename Time>
 double seconds_of(const Time& time) {
   if (time.nanosec_ >= 1000000000u) return std::numeric_limits<double>::quiet_NaN();
   return time.sec_ + 1e-9 * time.nanosec_;
-}
-
-double stamp_of(const std_msgs_msg_dds__Header_& header) {
-  return seconds_of(header.stamp_);
 }
 
 std::string text_of(const char* text) {
@@ -78,24 +78,25 @@ auto vector_of(const Sequence& sequence) {
 
 }  // namespace
 
+template <>
 void Wire<JointMessage>::write(dds_entity_t writer, const JointMessage& message) {
   auto wire = with_header<Type>(message.stamp_s);
-  std::vector<char*> names;
-  for (const std::string& name : message.names) names.push_back(pointer(name));
+  const std::vector<char*> names = pointers(message.names);
   point(wire.name_, names);
   point(wire.position_, message.positions);
   point(wire.velocity_, message.velocities);
   dds_write(writer, &wire);
 }
 
+template <>
 JointMessage Wire<JointMessage>::read(const Type& wire) {
-  return {stamp_of(wire.header_), texts_of(wire.name_), vector_of(wire.position_)};
+  return {seconds_of(wire.header_.stamp_), texts_of(wire.name_), vector_of(wire.position_)};
 }
 
+template <>
 void Wire<TrajectoryMessage>::write(dds_entity_t writer, const TrajectoryMessage& message) {
   auto wire = with_header<Type>(message.stamp_s);
-  std::vector<char*> names;
-  for (const std::string& name : message.names) names.push_back(pointer(name));
+  const std::vector<char*> names = pointers(message.names);
   std::vector<trajectory_msgs_msg_dds__JointTrajectoryPoint_> points(message.points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
     point(points[i].positions_, message.points[i].positions);
@@ -106,8 +107,9 @@ void Wire<TrajectoryMessage>::write(dds_entity_t writer, const TrajectoryMessage
   dds_write(writer, &wire);
 }
 
+template <>
 TrajectoryMessage Wire<TrajectoryMessage>::read(const Type& wire) {
-  TrajectoryMessage message{stamp_of(wire.header_), texts_of(wire.joint_names_), {}};
+  TrajectoryMessage message{seconds_of(wire.header_.stamp_), texts_of(wire.joint_names_), {}};
   for (std::uint32_t i = 0; i < wire.points_._length; ++i) {
     const auto& from = wire.points_._buffer[i];
     message.points.push_back({seconds_of(from.time_from_start_), vector_of(from.positions_)});
@@ -115,6 +117,7 @@ TrajectoryMessage Wire<TrajectoryMessage>::read(const Type& wire) {
   return message;
 }
 
+template <>
 void Wire<OperatingStateMessage>::write(dds_entity_t writer, const OperatingStateMessage& message) {
   auto wire = with_header<Type>(message.stamp_s);
   wire.state_ = pointer(message.state);
@@ -123,42 +126,49 @@ void Wire<OperatingStateMessage>::write(dds_entity_t writer, const OperatingStat
   dds_write(writer, &wire);
 }
 
+template <>
 OperatingStateMessage Wire<OperatingStateMessage>::read(const Type& wire) {
-  return {stamp_of(wire.header_), text_of(wire.state_), wire.is_homed_, wire.is_busy_};
+  return {seconds_of(wire.header_.stamp_), text_of(wire.state_), wire.is_homed_, wire.is_busy_};
 }
 
+template <>
 void Wire<StringMessage>::write(dds_entity_t writer, const StringMessage& message) {
   auto wire = with_header<Type>(message.stamp_s);
   wire.string_ = pointer(message.text);
   dds_write(writer, &wire);
 }
 
+template <>
 StringMessage Wire<StringMessage>::read(const Type& wire) {
-  return {stamp_of(wire.header_), text_of(wire.string_)};
+  return {seconds_of(wire.header_.stamp_), text_of(wire.string_)};
 }
 
+template <>
 void Wire<JoyMessage>::write(dds_entity_t writer, const JoyMessage& message) {
   auto wire = with_header<Type>(message.stamp_s);
   point(wire.buttons_, message.buttons);
   dds_write(writer, &wire);
 }
 
+template <>
 JoyMessage Wire<JoyMessage>::read(const Type& wire) {
-  return {stamp_of(wire.header_), vector_of(wire.buttons_)};
+  return {seconds_of(wire.header_.stamp_), vector_of(wire.buttons_)};
 }
 
+template <>
 void Wire<BoolMessage>::write(dds_entity_t writer, const BoolMessage& message) {
   const Type wire{message.value};
   dds_write(writer, &wire);
 }
 
+template <>
 BoolMessage Wire<BoolMessage>::read(const Type& wire) {
   return {wire.data_};
 }
 
+template <>
 void Wire<ImageMessage>::write(dds_entity_t writer, const ImageMessage& message) {
-  auto wire = with_header<Type>(message.stamp_s);
-  wire.header_.frame_id_ = pointer(message.frame);
+  auto wire = with_header<Type>(message.stamp_s, message.frame.c_str());
   wire.height_ = message.height;
   wire.width_ = message.width;
   wire.encoding_ = pointer(message.encoding);
@@ -168,9 +178,10 @@ void Wire<ImageMessage>::write(dds_entity_t writer, const ImageMessage& message)
   dds_write(writer, &wire);
 }
 
+template <>
 ImageMessage Wire<ImageMessage>::read(const Type& wire) {
   ImageMessage message;
-  message.stamp_s = stamp_of(wire.header_);
+  message.stamp_s = seconds_of(wire.header_.stamp_);
   message.width = wire.width_;
   message.height = wire.height_;
   message.step = wire.step_;
@@ -180,21 +191,22 @@ ImageMessage Wire<ImageMessage>::read(const Type& wire) {
   return message;
 }
 
+template <>
 void Wire<CompressedImageMessage>::write(dds_entity_t writer, const CompressedImageMessage& message) {
-  auto wire = with_header<Type>(message.stamp_s);
-  wire.header_.frame_id_ = pointer(message.frame);
+  auto wire = with_header<Type>(message.stamp_s, message.frame.c_str());
   wire.format_ = pointer(message.format);
   point(wire.data_, message.data);
   dds_write(writer, &wire);
 }
 
+template <>
 CompressedImageMessage Wire<CompressedImageMessage>::read(const Type& wire) {
-  return {stamp_of(wire.header_), text_of(wire.format_), vector_of(wire.data_)};
+  return {seconds_of(wire.header_.stamp_), text_of(wire.format_), vector_of(wire.data_)};
 }
 
+template <>
 void Wire<CameraInfoMessage>::write(dds_entity_t writer, const CameraInfoMessage& message) {
-  auto wire = with_header<Type>(message.stamp_s);
-  wire.header_.frame_id_ = pointer(message.frame);
+  auto wire = with_header<Type>(message.stamp_s, message.frame.c_str());
   static char model[] = "plumb_bob";
   wire.height_ = message.height;
   wire.width_ = message.width;
@@ -206,9 +218,9 @@ void Wire<CameraInfoMessage>::write(dds_entity_t writer, const CameraInfoMessage
   dds_write(writer, &wire);
 }
 
+template <>
 void Wire<PoseMessage>::write(dds_entity_t writer, const PoseMessage& message) {
-  auto wire = with_header<Type>(message.stamp_s);
-  wire.header_.frame_id_ = pointer(message.frame);
+  auto wire = with_header<Type>(message.stamp_s, message.frame.c_str());
   const auto& [x, y, z] = message.position_m;
   wire.pose_.pose_.position_ = {x, y, z};
   const auto& q = message.quaternion_xyzw;
@@ -217,24 +229,28 @@ void Wire<PoseMessage>::write(dds_entity_t writer, const PoseMessage& message) {
   dds_write(writer, &wire);
 }
 
+template <>
 void Wire<PlaceMessage>::write(dds_entity_t writer, const PlaceMessage& message) {
-  auto wire = with_header<Type>(message.stamp_s);
-  wire.header_.frame_id_ = pointer(message.frame);
+  auto wire = with_header<Type>(message.stamp_s, message.frame.c_str());
   wire.pose_ = pose_of(message.pose);
   dds_write(writer, &wire);
 }
 
+template <>
 PlaceMessage Wire<PlaceMessage>::read(const Type& wire) {
   const auto& at = wire.pose_.position_;
   const auto& turn = wire.pose_.orientation_;
-  return {stamp_of(wire.header_), {}, {Eigen::Quaterniond(turn.w_, turn.x_, turn.y_, turn.z_), {at.x_, at.y_, at.z_}}};
+  return {seconds_of(wire.header_.stamp_),
+          {},
+          {Eigen::Quaterniond(turn.w_, turn.x_, turn.y_, turn.z_), {at.x_, at.y_, at.z_}}};
 }
 
+template <>
 void Wire<TransformsMessage>::write(dds_entity_t writer, const TransformsMessage& message) {
   std::vector<geometry_msgs_msg_dds__TransformStamped_> transforms;
   for (const TransformsMessage::Transform& one : message.transforms) {
-    auto& to = transforms.emplace_back(with_header<geometry_msgs_msg_dds__TransformStamped_>(message.stamp_s));
-    to.header_.frame_id_ = pointer(one.frame);
+    auto& to = transforms.emplace_back(
+        with_header<geometry_msgs_msg_dds__TransformStamped_>(message.stamp_s, one.frame.c_str()));
     to.child_frame_id_ = pointer(one.child);
     const Eigen::Vector3d& at = one.frame_from_child.translation;
     to.transform_ = {{at.x(), at.y(), at.z()}, quaternion_of(one.frame_from_child.rotation)};
@@ -244,13 +260,19 @@ void Wire<TransformsMessage>::write(dds_entity_t writer, const TransformsMessage
   dds_write(writer, &wire);
 }
 
+template <>
+void Wire<StaticTransformsMessage>::write(dds_entity_t writer, const StaticTransformsMessage& message) {
+  Wire<TransformsMessage>::write(writer, message);
+}
+
+template <>
 void Wire<CylindersMessage>::write(dds_entity_t writer, const CylindersMessage& message) {
   constexpr std::int32_t cylinder = 3;
-  static char none[1] = "";
+  char* const none = const_cast<char*>("");
   std::vector<visualization_msgs_msg_dds__Marker_> markers;
   for (const CylindersMessage::Cylinder& one : message.cylinders) {
-    auto& to = markers.emplace_back(with_header<visualization_msgs_msg_dds__Marker_>(message.stamp_s));
-    to.header_.frame_id_ = pointer(message.frame);
+    auto& to =
+        markers.emplace_back(with_header<visualization_msgs_msg_dds__Marker_>(message.stamp_s, message.frame.c_str()));
     to.ns_ = pointer(message.name);
     to.id_ = static_cast<std::int32_t>(markers.size()) - 1;
     to.type_ = cylinder;
@@ -266,6 +288,7 @@ void Wire<CylindersMessage>::write(dds_entity_t writer, const CylindersMessage& 
   dds_write(writer, &wire);
 }
 
+template <>
 void Wire<DiagnosticMessage>::write(dds_entity_t writer, const DiagnosticMessage& message) {
   auto wire = with_header<Type>(message.stamp_s);
   std::vector<diagnostic_msgs_msg_dds__KeyValue_> values;
@@ -282,9 +305,9 @@ void Wire<DiagnosticMessage>::write(dds_entity_t writer, const DiagnosticMessage
   dds_write(writer, &wire);
 }
 
+template <>
 void Wire<ObservationMessage>::write(dds_entity_t writer, const ObservationMessage& message) {
-  auto wire = with_header<Type>(message.stamp_s);
-  wire.header_.frame_id_ = pointer(message.frame);
+  auto wire = with_header<Type>(message.stamp_s, message.frame.c_str());
   wire.instrument_ = pointer(message.instrument);
   wire.status_ = pointer(message.status);
   wire.action_ = pointer(message.action);

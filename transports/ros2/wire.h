@@ -1,130 +1,51 @@
 #pragma once
 
 #include <dds/dds.h>
+#include <utility>
 
 #include "lapservo/crtk/messages.h"
 #include "ros2_messages.h"
 
 namespace lapservo::internal {
 
-/// A message as ROS 2's type on the wire: its descriptor, how it is written, and what is read of it. Reading copies.
+/// A type of ROS 2's wire, with its descriptor.
+template <typename DdsType, const dds_topic_descriptor_t& description>
+struct WireType {
+  using Type = DdsType;
+  static const dds_topic_descriptor_t& descriptor() { return description; }
+};
+
+// That which carries a message.
+WireType<sensor_msgs_msg_dds__JointState_, sensor_msgs_msg_dds__JointState__desc> wire_type_of(const JointMessage&);
+WireType<trajectory_msgs_msg_dds__JointTrajectory_, trajectory_msgs_msg_dds__JointTrajectory__desc> wire_type_of(
+    const TrajectoryMessage&);
+WireType<crtk_msgs_msg_dds__OperatingState_, crtk_msgs_msg_dds__OperatingState__desc> wire_type_of(
+    const OperatingStateMessage&);
+WireType<crtk_msgs_msg_dds__StringStamped_, crtk_msgs_msg_dds__StringStamped__desc> wire_type_of(const StringMessage&);
+WireType<sensor_msgs_msg_dds__Joy_, sensor_msgs_msg_dds__Joy__desc> wire_type_of(const JoyMessage&);
+WireType<std_msgs_msg_dds__Bool_, std_msgs_msg_dds__Bool__desc> wire_type_of(const BoolMessage&);
+WireType<sensor_msgs_msg_dds__Image_, sensor_msgs_msg_dds__Image__desc> wire_type_of(const ImageMessage&);
+WireType<sensor_msgs_msg_dds__CompressedImage_, sensor_msgs_msg_dds__CompressedImage__desc> wire_type_of(
+    const CompressedImageMessage&);
+WireType<sensor_msgs_msg_dds__CameraInfo_, sensor_msgs_msg_dds__CameraInfo__desc> wire_type_of(
+    const CameraInfoMessage&);
+WireType<geometry_msgs_msg_dds__PoseWithCovarianceStamped_, geometry_msgs_msg_dds__PoseWithCovarianceStamped__desc>
+wire_type_of(const PoseMessage&);
+WireType<geometry_msgs_msg_dds__PoseStamped_, geometry_msgs_msg_dds__PoseStamped__desc> wire_type_of(
+    const PlaceMessage&);
+WireType<tf2_msgs_msg_dds__TFMessage_, tf2_msgs_msg_dds__TFMessage__desc> wire_type_of(const TransformsMessage&);
+WireType<visualization_msgs_msg_dds__MarkerArray_, visualization_msgs_msg_dds__MarkerArray__desc> wire_type_of(
+    const CylindersMessage&);
+WireType<diagnostic_msgs_msg_dds__DiagnosticArray_, diagnostic_msgs_msg_dds__DiagnosticArray__desc> wire_type_of(
+    const DiagnosticMessage&);
+WireType<lapservo_msgs_msg_dds__Observation_, lapservo_msgs_msg_dds__Observation__desc> wire_type_of(
+    const ObservationMessage&);
+
+/// A message as ROS 2's type on the wire: how it is written, and what is read of it. Reading copies.
 template <typename Message>
-struct Wire;
-
-template <>
-struct Wire<JointMessage> {
-  using Type = sensor_msgs_msg_dds__JointState_;
-  static const dds_topic_descriptor_t& descriptor() { return sensor_msgs_msg_dds__JointState__desc; }
-  static void write(dds_entity_t writer, const JointMessage& message);
-  static JointMessage read(const Type& wire);
-};
-
-template <>
-struct Wire<TrajectoryMessage> {
-  using Type = trajectory_msgs_msg_dds__JointTrajectory_;
-  static const dds_topic_descriptor_t& descriptor() { return trajectory_msgs_msg_dds__JointTrajectory__desc; }
-  static void write(dds_entity_t writer, const TrajectoryMessage& message);
-  static TrajectoryMessage read(const Type& wire);
-};
-
-template <>
-struct Wire<OperatingStateMessage> {
-  using Type = crtk_msgs_msg_dds__OperatingState_;
-  static const dds_topic_descriptor_t& descriptor() { return crtk_msgs_msg_dds__OperatingState__desc; }
-  static void write(dds_entity_t writer, const OperatingStateMessage& message);
-  static OperatingStateMessage read(const Type& wire);
-};
-
-template <>
-struct Wire<StringMessage> {
-  using Type = crtk_msgs_msg_dds__StringStamped_;
-  static const dds_topic_descriptor_t& descriptor() { return crtk_msgs_msg_dds__StringStamped__desc; }
-  static void write(dds_entity_t writer, const StringMessage& message);
-  static StringMessage read(const Type& wire);
-};
-
-template <>
-struct Wire<JoyMessage> {
-  using Type = sensor_msgs_msg_dds__Joy_;
-  static const dds_topic_descriptor_t& descriptor() { return sensor_msgs_msg_dds__Joy__desc; }
-  static void write(dds_entity_t writer, const JoyMessage& message);
-  static JoyMessage read(const Type& wire);
-};
-
-template <>
-struct Wire<BoolMessage> {
-  using Type = std_msgs_msg_dds__Bool_;
-  static const dds_topic_descriptor_t& descriptor() { return std_msgs_msg_dds__Bool__desc; }
-  static void write(dds_entity_t writer, const BoolMessage& message);
-  static BoolMessage read(const Type& wire);
-};
-
-template <>
-struct Wire<ImageMessage> {
-  using Type = sensor_msgs_msg_dds__Image_;
-  static const dds_topic_descriptor_t& descriptor() { return sensor_msgs_msg_dds__Image__desc; }
-  static void write(dds_entity_t writer, const ImageMessage& message);
-  static ImageMessage read(const Type& wire);
-};
-
-template <>
-struct Wire<CompressedImageMessage> {
-  using Type = sensor_msgs_msg_dds__CompressedImage_;
-  static const dds_topic_descriptor_t& descriptor() { return sensor_msgs_msg_dds__CompressedImage__desc; }
-  static void write(dds_entity_t writer, const CompressedImageMessage& message);
-  static CompressedImageMessage read(const Type& wire);
-};
-
-template <>
-struct Wire<CameraInfoMessage> {
-  using Type = sensor_msgs_msg_dds__CameraInfo_;
-  static const dds_topic_descriptor_t& descriptor() { return sensor_msgs_msg_dds__CameraInfo__desc; }
-  static void write(dds_entity_t writer, const CameraInfoMessage& message);
-};
-
-template <>
-struct Wire<PoseMessage> {
-  using Type = geometry_msgs_msg_dds__PoseWithCovarianceStamped_;
-  static const dds_topic_descriptor_t& descriptor() { return geometry_msgs_msg_dds__PoseWithCovarianceStamped__desc; }
-  static void write(dds_entity_t writer, const PoseMessage& message);
-};
-
-template <>
-struct Wire<PlaceMessage> {
-  using Type = geometry_msgs_msg_dds__PoseStamped_;
-  static const dds_topic_descriptor_t& descriptor() { return geometry_msgs_msg_dds__PoseStamped__desc; }
-  static void write(dds_entity_t writer, const PlaceMessage& message);
-  static PlaceMessage read(const Type& wire);
-};
-
-template <>
-struct Wire<TransformsMessage> {
-  using Type = tf2_msgs_msg_dds__TFMessage_;
-  static const dds_topic_descriptor_t& descriptor() { return tf2_msgs_msg_dds__TFMessage__desc; }
-  static void write(dds_entity_t writer, const TransformsMessage& message);
-};
-template <>
-struct Wire<StaticTransformsMessage> : Wire<TransformsMessage> {};
-
-template <>
-struct Wire<CylindersMessage> {
-  using Type = visualization_msgs_msg_dds__MarkerArray_;
-  static const dds_topic_descriptor_t& descriptor() { return visualization_msgs_msg_dds__MarkerArray__desc; }
-  static void write(dds_entity_t writer, const CylindersMessage& message);
-};
-
-template <>
-struct Wire<DiagnosticMessage> {
-  using Type = diagnostic_msgs_msg_dds__DiagnosticArray_;
-  static const dds_topic_descriptor_t& descriptor() { return diagnostic_msgs_msg_dds__DiagnosticArray__desc; }
-  static void write(dds_entity_t writer, const DiagnosticMessage& message);
-};
-
-template <>
-struct Wire<ObservationMessage> {
-  using Type = lapservo_msgs_msg_dds__Observation_;
-  static const dds_topic_descriptor_t& descriptor() { return lapservo_msgs_msg_dds__Observation__desc; }
-  static void write(dds_entity_t writer, const ObservationMessage& message);
+struct Wire : decltype(wire_type_of(std::declval<const Message&>())) {
+  static void write(dds_entity_t writer, const Message& message);
+  static Message read(const typename Wire::Type& wire);
 };
 
 }  // namespace lapservo::internal

@@ -60,18 +60,8 @@ Option& Option::required() {
   return *this;
 }
 
-Option& Option::expected(int count) {
-  option_->expected(count);
-  return *this;
-}
-
 Option& Option::without_value(const std::string& meant) {
   option_->expected(0, 1)->default_str(meant);
-  return *this;
-}
-
-Option& Option::delimiter(char between_values) {
-  option_->delimiter(between_values);
   return *this;
 }
 
@@ -92,9 +82,10 @@ Option& Option::whole_number_between(double low, double high) {
   return *this;
 }
 
-Option& Option::finite_number() {
+Option& Option::finite_numbers(std::optional<int> count) {
   constexpr double any = std::numeric_limits<double>::max();
-  option_->check(checked("a finite number", false, -any, any));
+  option_->check(checked("a finite number", false, -any, any))->delimiter(',');
+  if (count) option_->expected(*count);
   return *this;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -24,9 +25,6 @@ class Option {
   explicit Option(CLI::Option* option) : option_(option) {}
 
   Option& required();
-  /// Takes so many values.
-  Option& expected(int count);
-  Option& delimiter(char between_values);
   /// The option alone means this.
   Option& without_value(const std::string& meant);
   Option& one_of(const std::vector<std::string>& words);
@@ -35,7 +33,8 @@ class Option {
   // nan through every range, -1 as an enormous unsigned and blanks as nothing.
   Option& number_between(double low, double high);
   Option& whole_number_between(double low, double high);
-  Option& finite_number();
+  /// So many, with commas between them.
+  Option& finite_numbers(std::optional<int> count = std::nullopt);
   /// Any whole number of 53 bits.
   Option& seed_number();
 

@@ -226,13 +226,10 @@ void add_design(Command parent, Run& run_later) {
                   "Standard deviation of where each boundary is printed and cut: minimise what it does to the "
                   "rotation, together with the noise; else noise alone, and what 0.1 mm does is said")
       .number_between(0.001, 10.0);
-  command.add_option("--hues", options->hues_deg, "Three hues in degrees, proximal to distal")
-      .finite_number()
-      .delimiter(',');
+  command.add_option("--hues", options->hues_deg, "Three hues in degrees, proximal to distal").finite_numbers();
   command.add_option("--bands-upper-mm", options->upper_mm, "Evaluate this design: lengths at the upper edge")
-      .finite_number()
-      .delimiter(',');
-  command.add_option("--bands-lower-mm", options->lower_mm, "and at the lower edge").finite_number().delimiter(',');
+      .finite_numbers();
+  command.add_option("--bands-lower-mm", options->lower_mm, "and at the lower edge").finite_numbers();
   command.add_option("--out", options->out, "Write the marker: block of a rig; a file of that name is replaced");
   add_viewing(command, options->viewing, fmt::format("{:g}", usual_focal_px));
   command.footer(

@@ -74,9 +74,10 @@ class Recording {
   }
   void subscribe_joints(Transports& transports, const Address& arm) {
     const std::string topic = topic_of(arm.name, "measured_js");
-    joints_ = transports.get(arm.transport, "--robot").subscribe_joints(topic, [this, topic](JointMessage&& message) {
-      recorder_.add(topic, std::move(message));
-    });
+    joints_ =
+        transports.get(arm.transport, "--robot").subscribe<JointMessage>(topic, [this, topic](JointMessage&& message) {
+          recorder_.add(topic, std::move(message));
+        });
   }
   ImageSink sink_of_topic(const std::string& topic) {
     return {[this, topic](ImageMessage&& message) { add(topic, std::move(message)); },

@@ -52,9 +52,9 @@ void refuse_taken_name(Transport& transport, const SimRobotConfig& config, const
   constexpr double listen_s = 2;  // until whoever is there has been found
   std::atomic<bool> heard = false;
   const auto joints =
-      transport.subscribe_joints(topic_of(config.arm, "measured_js"), [&](JointMessage&&) { heard = true; });
-  const auto states = transport.subscribe_operating_state(topic_of(config.arm, "operating_state"),
-                                                          [&](OperatingStateMessage&&) { heard = true; });
+      transport.subscribe<JointMessage>(topic_of(config.arm, "measured_js"), [&](JointMessage&&) { heard = true; });
+  const auto states = transport.subscribe<OperatingStateMessage>(topic_of(config.arm, "operating_state"),
+                                                                 [&](OperatingStateMessage&&) { heard = true; });
   if (wait_until([&] { return heard.load(); }, listen_s))
     throw InputError("--arm", "is " + arm + ", where an arm is already, expected a name of its own");
 }
@@ -123,9 +123,7 @@ void add_sim_robot(Command app, Run& run_later) {
   command.add_option("--arm", options->arm, "Namespace of its CRTK topics, where no other arm is");
   command.add_option("--camera", options->camera, "Namespace of image_raw and camera_info");
   command.add_option("--start", options->start, "Measured joints to start from, theta,phi,rho,psi; else random")
-      .finite_number()
-      .delimiter(',')
-      .expected(4);
+      .finite_numbers(4);
   command.add_option("--seed", options->seed, "Seed of start, tissue, noise, jitter").seed_number();
   command.add_option("--latency-ms", options->latency_ms, "From exposure to publication").number_between(0.0, 1000.0);
   command.add_option("--fps", options->fps, "Frames a second").number_between(6.0, 120.0);

@@ -101,7 +101,7 @@ class LiveWrist {
   explicit LiveWrist(const std::string& topic) {
     const Address address = address_of(topic, "--joints");
     transport_ = make_transport(address.transport, "lapservo_wrist", "--joints");
-    subscription_ = transport_->subscribe_joints(address.name, [this](JointMessage&& message) {
+    subscription_ = transport_->subscribe<JointMessage>(address.name, [this](JointMessage&& message) {
       const std::lock_guard lock(mutex_);
       history_.add(std::move(message), clock_.now_s());
     });

@@ -9,6 +9,14 @@
 
 namespace lapservo::app {
 using namespace internal;
+namespace {
+
+Transport::Subscription subscribe(Transport& transport, const std::string& topic, const ImageSink& sink) {
+  return topic.ends_with("/compressed") ? transport.subscribe<CompressedImageMessage>(topic, sink.compressed)
+                                        : transport.subscribe<ImageMessage>(topic, sink.image);
+}
+
+}  // namespace
 
 Transport& Transports::get(const std::string& transport, const std::string& option) {
   auto& made = transports_[transport];
@@ -36,10 +44,7 @@ ImageInput open_images(const std::string& text, const std::string& option, const
                        ImageSink sink) {
   if (names_topic(text)) {
     const Address address = address_of(text, option);
-    Transport& transport = transports.get(address.transport, option);
-    return {address.name.ends_with("/compressed") ? transport.subscribe_compressed_images(address.name, sink.compressed)
-                                                  : transport.subscribe_images(address.name, sink.image),
-            nullptr};
+    return {subscribe(transports.get(address.transport, option), address.name, sink), nullptr};
   }
   if (!names_camera(text))
     throw InputError(option, (text.empty() ? "is missing" : "is " + text) +

@@ -94,7 +94,7 @@ class DvrkOutput {
     const Address arm = address_of(options_.set_base_frame, "--set-base-frame");
     Transport& transport = transports_.get(arm.transport, "--set-base-frame");
     const std::string topic = topic_of(arm.name, "set_base_frame");
-    const auto say = transport.place_publisher(topic);
+    const auto say = transport.publisher<PlaceMessage>(topic);
     if (!wait_until([&] { return !transport.readers(topic).empty(); }, wait_s))
       throw InputError("--set-base-frame", fmt::format("{} has no reader within {:.0f} s", topic, wait_s));
     // Again and again: a reader that is known here may not know this writer yet.

@@ -1,13 +1,72 @@
 #include "apps/lapservo/commands/servo/run_watcher.h"
 
+#include <cstdint>
 #include <cstdio>
 #include <utility>
 
 #include "apps/lapservo/cli/interrupt.h"
+#include "lapservo/core/atomic_file.h"
 #include "lapservo/core/error.h"
+#include "lapservo/rig/rig_writer.h"
+#include "lapservo/servo/controller_file.h"
 
 namespace lapservo::app {
 using namespace internal;
+namespace {
+
+std::uintmax_t needed_bytes(double duration_s, const ControllerConfig& controller) {
+  constexpr std::uintmax_t bytes_a_tick = 4000;
+  return bytes_a_tick * static_cast<std::uintmax_t>(duration_s / controller.period_s) + (1 << 20);
+}
+
+InputFiles inputs_of(const ServoOptions& options, const Rig& rig) {
+  InputFiles inputs;
+  inputs.add_rig(options.rig, rig);
+  inputs.add(options.controller);
+  inputs.add(options.trajectory);
+  inputs.add(options.joint_limits);
+  inputs.add(options.replay);
+  if (!options.replay.empty()) inputs.add_pictures_in(options.replay);
+  return inputs;
+}
+
+}  // namespace
+
+void say(double time_s, const std::string& what) {
+  std::printf("%.2f s  %s\n", time_s, what.c_str());
+  std::fflush(stdout);
+}
+
+RunFolder::RunFolder(const ServoOptions& options, double duration_s, const Rig& rig, const ControllerConfig& controller,
+                     const Rig* truth)
+    : folder_(options.out, rig, inputs_of(options, rig), options.force, needed_bytes(duration_s, controller)),
+      log_(folder_ / "log.csv") {
+  write_file(folder_ / "controller.yaml", controller_yaml(controller));
+  if (truth && rig_yaml(*truth) != rig_yaml(rig)) write_file(folder_ / "true_rig.yaml", rig_yaml(*truth));
+}
+
+void RunFolder::add(const ControlTick& tick, const std::optional<InstrumentTruth>& truth) {
+  if (failed_) return;
+  try {
+    log_.add(tick.input, tick.decision, truth);
+  } catch (const InputError& error) {
+    failed_ = true;
+    std::fprintf(stderr, "lapservo: %s: the run goes on without a log\n", error.what());
+  }
+}
+
+bool RunFolder::commit() {
+  if (failed_) return false;
+  log_.commit();
+  folder_.commit();
+  return true;
+}
+
+std::unique_ptr<RunFolder> run_folder(const ServoOptions& options, double duration_s, const Rig& rig,
+                                      const ControllerConfig& controller, const Rig* truth) {
+  if (options.out.empty()) return nullptr;
+  return std::make_unique<RunFolder>(options, duration_s, rig, controller, truth);
+}
 
 bool RunWatcher::on_tick(const ControlTick& tick) {
   if (!start_s_) start_s_ = tick.input.time_s;

@@ -5,14 +5,39 @@
 #include <string>
 #include <utility>
 
+#include "apps/lapservo/cli/output_folder.h"
 #include "apps/lapservo/commands/servo/changing_goal.h"
 #include "apps/lapservo/commands/servo/servo_options.h"
-#include "apps/lapservo/commands/servo/servo_output.h"
 #include "apps/lapservo/commands/servo/servo_page.h"
 #include "lapservo/robot/supervisor.h"
 #include "lapservo/servo/run_summary.h"
+#include "lapservo/servo/servo_log.h"
 
 namespace lapservo::app {
+
+/// A line of a run's, at once.
+void say(double time_s, const std::string& what);
+/// A run's log.csv, rig.yaml and controller.yaml.
+class RunFolder {
+ public:
+  /// With the whole rig, whatever the method forgets of it: the frames can be tracked with it too. `truth`: the
+  /// simulation's rig, kept in true_rig.yaml where it is another one.
+  RunFolder(const ServoOptions& options, double duration_s, const Rig& rig, const ControllerConfig& controller,
+            const Rig* truth = nullptr);
+  /// A failure to write is reported once, and never ends the run.
+  void add(const ControlTick& tick, const std::optional<InstrumentTruth>& truth);
+  /// False where something could not be written.
+  bool commit();
+
+ private:
+  OutputFolder folder_;
+  ServoLog log_;
+  bool failed_ = false;
+};
+
+/// By --out; none without it.
+std::unique_ptr<RunFolder> run_folder(const ServoOptions& options, double duration_s, const Rig& rig,
+                                      const ControllerConfig& controller, const Rig* truth = nullptr);
 
 /// The user's view of a run: its log, its page and its last lines. A kind of run adds its own by follow().
 class RunWatcher : public RunObserver {
@@ -52,5 +77,12 @@ class RunWatcher : public RunObserver {
   std::string state_;
   bool is_new_state_ = false;
 };
+
+/// `lapservo servo` with a CRTK arm and a camera behind a transport. Returns the exit code: 0 when it converged.
+int steer_arm(const ServoOptions& options);
+
+/// `servo --replay BAG`: the loop over what a bag recorded of an arm and its camera, as it would have gone by it
+/// without --enable-motion; what it decides moves nothing. Returns the exit code: 1 when it would have held throughout.
+int decide_on_recording(const ServoOptions& options);
 
 }  // namespace lapservo::app

@@ -14,9 +14,7 @@
 #include "apps/lapservo/cli/progress.h"
 #include "apps/lapservo/cli/subcommands.h"
 #include "apps/lapservo/commands/servo/run_watcher.h"
-#include "apps/lapservo/commands/servo/servo_arm.h"
 #include "apps/lapservo/commands/servo/servo_options.h"
-#include "apps/lapservo/commands/servo/servo_recording.h"
 #include "apps/lapservo/inputs/frame_input.h"
 #include "apps/lapservo/inputs/joint_input.h"
 #include "apps/lapservo/inputs/transports.h"
@@ -28,7 +26,6 @@
 #include "lapservo/servo/controller_file.h"
 #include "lapservo/servo/goal_check.h"
 #include "lapservo/servo/image_features.h"
-#include "lapservo/servo/replay.h"
 #include "lapservo/servo/run.h"
 #include "lapservo/servo/servo_log.h"
 #include "lapservo/servo/tip_goals.h"
@@ -52,7 +49,7 @@ Rig true_rig_of(const ServoOptions& options, const Rig& rig) {
 
 JointVector joints_at_start(const ServoOptions& options, const Trajectory& trajectory, const RunConfig& run,
                             const FeatureModel& true_model, const Eigen::Vector4d& joint_offset) {
-  if (!options.start.empty()) return JointVector::from_vector(four(options.start));
+  if (!options.start.empty()) return JointVector::from_vector(Eigen::Vector4d(options.start.data()));
   Random random(options.seed);
   TipGoals tips(run.rig, run.controller.scales);
   if (trajectory.tip_at(0)) {
@@ -234,22 +231,18 @@ void add_trajectory_options(Command command, ServoOptions& options) {
       "paper: section V-D's sinusoids, omega 0.5 read in rad/s; or a CSV of time_s,s_rad,r_px,l_px,d_px, or of the "
       "tip: time_s,x_m,y_m,z_m with roll_rad or without. Its time stands while the arm is held until a start");
   command.add_option("--set-point", options.set_point, "Instead: s_rad,r_px,l_px,d_px to reach and keep")
-      .finite_number()
-      .delimiter(',')
-      .expected(4);
+      .finite_numbers(4);
   command
       .add_option(
           "--tip", options.tip,
           "Instead: x,y,z or x,y,z,roll of the tip in the camera's frame, metres and rad, to reach and keep, by "
           "the rig's camera_from_rcm and tool. The image closes it across the line of sight; in depth the rig "
           "counts. roll is psi; without it the roll stays")
-      .finite_number()
-      .delimiter(',');
+      .finite_numbers();
   command
       .add_option("--via", options.via,
                   "Instead: points s_rad,r_px,l_px,d_px,s_rad,... to pass, a second at rest in each")
-      .finite_number()
-      .delimiter(',');
+      .finite_numbers();
   command.add_option("--duration", options.duration, "Seconds, else 20, or all of a recording")
       .number_between(0.1, 36000.0);
 }
@@ -266,10 +259,7 @@ void add_control_options(Command command, ServoOptions& options) {
   command.add_option("--controller", options.controller,
                      "YAML: gains_per_s, limits, window, delay_s ..., see docs/controller.md");
   command.add_option("--delay-ms", options.delay, "The images' age, or `estimate`");
-  command.add_option("--rcm-px", options.rcm_px, "Image of the RCM u,v, for --method uncalibrated")
-      .finite_number()
-      .delimiter(',')
-      .expected(2);
+  command.add_option("--rcm-px", options.rcm_px, "Image of the RCM u,v, for --method uncalibrated").finite_numbers(2);
 }
 
 void add_result_options(Command command, ServoOptions& options) {
@@ -293,9 +283,7 @@ void add_replay_options(Command command, ServoOptions& options) {
 
 void add_simulator_options(Command command, ServoOptions& options) {
   command.add_option("--start", options.start, "sim: measured joints to start from, theta,phi,rho,psi; else random")
-      .finite_number()
-      .delimiter(',')
-      .expected(4);
+      .finite_numbers(4);
   command.add_option("--seed", options.seed, "sim: of start, tissue, noise, jitter").seed_number();
   command.add_option("--latency-ms", options.latency_ms, "sim: from exposure to arrival").number_between(0.0, 1000.0);
   command
@@ -305,13 +293,8 @@ void add_simulator_options(Command command, ServoOptions& options) {
   command
       .add_option("--registration-error", options.registration_error,
                   "sim: x,y,z: the true RCM lies by so many mm, in the camera's frame, beside the rig's")
-      .finite_number()
-      .delimiter(',')
-      .expected(3);
-  command.add_option("--hide", options.hide, "sim: cover the marker from,to seconds")
-      .finite_number()
-      .delimiter(',')
-      .expected(2);
+      .finite_numbers(3);
+  command.add_option("--hide", options.hide, "sim: cover the marker from,to seconds").finite_numbers(2);
 }
 
 }  // namespace

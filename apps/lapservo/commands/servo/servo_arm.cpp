@@ -1,5 +1,3 @@
-#include "apps/lapservo/commands/servo/servo_arm.h"
-
 #include <cstdio>
 #include <functional>
 #include <memory>
@@ -13,6 +11,7 @@
 #include "apps/lapservo/cli/interrupt.h"
 #include "apps/lapservo/commands/servo/changing_goal.h"
 #include "apps/lapservo/commands/servo/run_watcher.h"
+#include "apps/lapservo/commands/servo/servo_options.h"
 #include "apps/lapservo/inputs/live_images.h"
 #include "apps/lapservo/inputs/transports.h"
 #include "lapservo/core/error.h"

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <utility>
 
+#include <Eigen/Core>
 #include <fmt/format.h>
 
 #include "lapservo/control/paper_trajectory.h"
@@ -27,10 +28,6 @@ namespace {
 constexpr double window_margin_px = 20, via_dwell_s = 1;
 const Eigen::Vector4d via_rate(0.05, 60, 40, 40);  // s_rad, r, l, d px a second
 
-JointLimits limits_of(const ServoOptions& options, const Rig& rig) {
-  return limits_of_q(*arm_of(options, rig).joints, load_arm_limits(options.joint_limits));
-}
-
 ControllerConfig controller_of(const ServoOptions& options, const Rig& rig) {
   ControllerConfig config;
   const auto mode = control_mode_from_string(options.method);
@@ -46,7 +43,8 @@ ControllerConfig controller_of(const ServoOptions& options, const Rig& rig) {
       throw InputError("--delay-ms", "is " + options.delay + ", expected milliseconds: it looks like seconds");
     config.observer.delay_s = *delay_ms / 1000;
   }
-  if (!options.joint_limits.empty()) config.limits = limits_of(options, rig);
+  if (!options.joint_limits.empty())
+    config.limits = limits_of_q(*arm_of(options, rig).joints, load_arm_limits(options.joint_limits));
   const JointLimits of_arm = config.limits;
   if (!options.controller.empty()) config = load_controller(options.controller, config);
   if (!options.joint_limits.empty()) config.limits = both_limits(config.limits, of_arm);
@@ -87,12 +85,6 @@ Rig steered_rig(const ServoOptions& options) {
   return first_instrument(std::move(rig), options.rig);
 }
 
-// The paper's law comes with the paper's eyes.
-Method tracker_of(const ServoOptions& options, ControlMode mode) {
-  const bool own = options.tracker.empty() && mode == ControlMode::paper;
-  return own || options.tracker == "centerline" ? Method::centerline : Method::surface;
-}
-
 std::vector<Eigen::Vector4d> points_of(const std::vector<double>& numbers) {
   if (numbers.size() % 4 != 0)
     throw InputError("--via",
@@ -119,11 +111,6 @@ std::string goal_option(const ServoOptions& options) {
   return given[0];
 }
 
-std::string trajectory_name(const ServoOptions& options) {
-  const std::string goal = goal_option(options);
-  return goal == "--trajectory" ? options.trajectory : goal;
-}
-
 }  // namespace
 
 bool may_command(const ServoOptions& options, std::string_view who) {
@@ -138,10 +125,6 @@ double duration_s(const ServoOptions& options) {
   return options.duration.value_or(20);
 }
 
-Eigen::Vector4d four(const std::vector<double>& values) {
-  return Eigen::Vector4d(values.data());
-}
-
 const Instrument& arm_of(const ServoOptions& options, const Rig& rig) {
   const Instrument& instrument = rig.instruments.front();
   if (!instrument.joints)
@@ -151,7 +134,7 @@ const Instrument& arm_of(const ServoOptions& options, const Rig& rig) {
 
 Trajectory trajectory_of(const ServoOptions& options) {
   const std::string goal = goal_option(options);
-  if (goal == "--set-point") return set_point(four(options.set_point));
+  if (goal == "--set-point") return set_point(Eigen::Vector4d(options.set_point.data()));
   if (goal == "--tip") return tip_set_point(tip_of(options.tip), "--tip");
   if (goal == "--via") return via_points(points_of(options.via), via_rate, via_dwell_s);
   if (options.trajectory == "paper") return sinusoids(paper_sinusoids());
@@ -179,8 +162,11 @@ RunConfig run_config_of(const ServoOptions& options) {
     throw InputError("--rcm-px", "is of another method, expected --method uncalibrated with it");
   if (options.robot == "sim" || run.controller.mode != ControlMode::uncalibrated)
     run.rig = single_instrument(std::move(run.rig), options.rig);
-  run.trajectory_name = trajectory_name(options);
-  run.tracker.method = tracker_of(options, run.controller.mode);
+  const std::string goal = goal_option(options);
+  run.trajectory_name = goal == "--trajectory" ? options.trajectory : goal;
+  // The paper's law comes with the paper's eyes.
+  const bool own = options.tracker.empty() && run.controller.mode == ControlMode::paper;
+  run.tracker.method = own || options.tracker == "centerline" ? Method::centerline : Method::surface;
   return run;
 }
 

@@ -6,8 +6,6 @@
 #include <string_view>
 #include <vector>
 
-#include <Eigen/Core>
-
 #include "apps/lapservo/cli/web_view.h"
 #include "apps/lapservo/inputs/frame_input.h"
 #include "apps/lapservo/inputs/transports.h"
@@ -35,8 +33,6 @@ struct ServoOptions {
   /// Else a topic does, or nobody has to.
   bool page_says_operator_present() const { return operator_present == "page"; }
 };
-
-Eigen::Vector4d four(const std::vector<double>& values);
 
 /// Before it is made to forget anything.
 RunConfig run_config_of(const ServoOptions& options);

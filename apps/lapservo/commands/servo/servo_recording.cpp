@@ -1,5 +1,3 @@
-#include "apps/lapservo/commands/servo/servo_recording.h"
-
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -10,6 +8,7 @@
 #include "apps/lapservo/cli/interrupt.h"
 #include "apps/lapservo/cli/progress.h"
 #include "apps/lapservo/commands/servo/run_watcher.h"
+#include "apps/lapservo/commands/servo/servo_options.h"
 #include "apps/lapservo/inputs/frame_input.h"
 #include "apps/lapservo/inputs/joint_input.h"
 #include "recordings/bag_topics.h"

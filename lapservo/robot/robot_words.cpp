@@ -1,6 +1,6 @@
-#include "lapservo/robot/blocked.h"
-
 #include "lapservo/core/words.h"
+#include "lapservo/robot/blocked.h"
+#include "lapservo/robot/operating_state.h"
 
 namespace lapservo {
 using namespace internal;
@@ -32,6 +32,12 @@ constexpr Words<Blocked, 24> blocked_words{{{Blocked::none, "none"},
                                             {Blocked::ended, "ended"}}};
 static_assert(names_all(blocked_words, Blocked::ended));
 
+constexpr Words<OperatingState, 4> state_words{{{OperatingState::disabled, "DISABLED"},
+                                                {OperatingState::enabled, "ENABLED"},
+                                                {OperatingState::paused, "PAUSED"},
+                                                {OperatingState::fault, "FAULT"}}};
+static_assert(names_all(state_words, OperatingState::fault));
+
 }  // namespace
 
 std::string_view to_string(Blocked blocked) {
@@ -40,6 +46,14 @@ std::string_view to_string(Blocked blocked) {
 
 std::optional<Blocked> blocked_from_string(std::string_view word) {
   return read_word(blocked_words, word);
+}
+
+std::string_view to_string(OperatingState state) {
+  return word_of(state_words, state);
+}
+
+std::optional<OperatingState> operating_state_from_string(std::string_view word) {
+  return read_word(state_words, word);
 }
 
 }  // namespace lapservo

@@ -1,10 +1,15 @@
+#include "lapservo/control/control_step.h"
 #include "lapservo/control/hold_reason.h"
-
+#include "lapservo/control/image_measurement.h"
 #include "lapservo/core/words.h"
 
 namespace lapservo {
 using namespace internal;
 namespace {
+
+constexpr Words<ControlAction, 3> action_words{
+    {{ControlAction::track, "track"}, {ControlAction::probe, "probe"}, {ControlAction::hold, "hold"}}};
+static_assert(names_all(action_words, ControlAction::hold));
 
 constexpr Words<HoldReason, 23> reason_words{{{HoldReason::none, "none"},
                                               {HoldReason::no_image_yet, "no_image_yet"},
@@ -31,10 +36,27 @@ constexpr Words<HoldReason, 23> reason_words{{{HoldReason::none, "none"},
                                               {HoldReason::arm_not_enabled, "arm_not_enabled"}}};
 static_assert(names_all(reason_words, HoldReason::arm_not_enabled));
 
+constexpr Words<Repetition, 3> repetition_words{{{Repetition::none, "none"},
+                                                 {Repetition::possible_at_rest, "possible_at_rest"},
+                                                 {Repetition::of_a_noisy_camera, "of_a_noisy_camera"}}};
+static_assert(names_all(repetition_words, Repetition::of_a_noisy_camera));
+
 }  // namespace
+
+std::string_view to_string(ControlAction action) {
+  return word_of(action_words, action);
+}
 
 std::string_view to_string(HoldReason reason) {
   return word_of(reason_words, reason);
+}
+
+std::string_view to_string(Repetition repetition) {
+  return word_of(repetition_words, repetition);
+}
+
+std::optional<Repetition> repetition_from_string(std::string_view word) {
+  return read_word(repetition_words, word);
 }
 
 }  // namespace lapservo
