@@ -30,10 +30,14 @@ void require_positive(const char* field, const Eigen::Vector4d& values) {
   for (int i = 0; i < 4; ++i) require_positive(element(field, i), values[i]);
 }
 
+void require_not_negative(const std::string& field, double value, const char* expected = "0 or more") {
+  require(std::isfinite(value) && value >= 0, field, value, expected);
+}
+
 void check_gains(const ControllerConfig& config) {
   for (int i = 0; i < 4; ++i) {
     const double gain = config.gains.per_s[i];
-    require(std::isfinite(gain) && gain >= 0, element("gains_per_s", i), gain, "0 or more per second");
+    require_not_negative(element("gains_per_s", i), gain, "0 or more per second");
     require(gain * config.period_s < 1, element("gains_per_s", i), gain, "less than one per control period");
   }
 }
@@ -73,21 +77,19 @@ void check_observer(const ObserverConfig& observer) {
   require_positive("observer.bandwidth_rad_s", observer.bandwidth_rad_s);
   require_positive("observer.offset_walk", observer.offset_walk);
   require_positive("observer.max_offset", observer.max_offset);
-  require(observer.offset_per_motion >= 0, "observer.offset_per_motion", observer.offset_per_motion, "0 or more");
+  require_not_negative("observer.offset_per_motion", observer.offset_per_motion);
   require_positive("observer.gate_chi2", observer.gate_chi2);
   require(observer.reacquire_after >= 1, "observer.reacquire_after", observer.reacquire_after, "1 or more");
-  for (int i = 0; i < 4; ++i) {
-    const double largest = observer.backlash.largest[i];
-    require(std::isfinite(largest) && largest >= 0, element("observer.backlash.largest", i), largest, "0 or more");
-  }
+  for (int i = 0; i < 4; ++i)
+    require_not_negative(element("observer.backlash.largest", i), observer.backlash.largest[i]);
 }
 
 void check_learning(const ControllerConfig& config) {
   require_positive("jacobian.noise", config.jacobian.noise);
   require_positive("jacobian.bend", config.jacobian.bend);
   require_positive("jacobian.gate_chi2", config.jacobian.gate_chi2);
-  require(config.jacobian.walk >= 0, "jacobian.walk", config.jacobian.walk, "0 or more");
-  require(config.jacobian.slack >= 0, "jacobian.slack", config.jacobian.slack, "0 or more");
+  require_not_negative("jacobian.walk", config.jacobian.walk);
+  require_not_negative("jacobian.slack", config.jacobian.slack);
   require(config.jacobian.reacquire_after >= 1, "jacobian.reacquire_after", config.jacobian.reacquire_after,
           "1 or more");
   require_positive("probing.distance", config.probing.distance);
@@ -133,7 +135,7 @@ ControllerConfig checked(const ControllerConfig& config) {
   check_observer(config.observer);
   check_learning(config);
   require_positive("damping_threshold", config.damping_threshold);
-  require(config.min_singular_value >= 0, "min_singular_value", config.min_singular_value, "0 or more");
+  require_not_negative("min_singular_value", config.min_singular_value);
   require_positive("stale_after_s", config.stale_after_s);
   require_positive("max_image_age_s", config.max_image_age_s);
   require_positive("max_following_error", config.max_following_error);

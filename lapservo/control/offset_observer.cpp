@@ -125,14 +125,12 @@ Update OffsetObserver::start(const FeatureModel& model, const Eigen::Vector4d& q
     if (!found || (other && other->converged)) found = other;
   }
   if (!found) return Update::not_modelled;
-  offset_ = found->q - q_driven_then;
-  offset_[3] = wrap_pi(offset_[3]);  // the image knows no turns of psi
-  feature_offset_.setZero();
-  const auto state = model(found->q);
-  if (!state) return Update::not_modelled;
-  limit_offset(state->jacobian);
-  const auto limited = model(q_driven_then + offset_);
+  Eigen::Vector4d offset = found->q - q_driven_then;
+  offset[3] = wrap_pi(offset[3]);  // the image knows no turns of psi
+  offset = within_limits(offset);
+  const auto limited = model(q_driven_then + offset);
   if (!limited) return Update::not_modelled;
+  offset_ = offset;
   feature_offset_ = feature_error(image.features, limited->features);
   ends_offset_px_ = image.ends_px - limited->ends_px;
   const Eigen::Matrix4d inverse = damped_inverse(limited->jacobian, scales_).inverse;
@@ -163,8 +161,12 @@ bool OffsetObserver::agrees_with_last_outlier(const Eigen::Vector4d& seen_offset
   return outliers_ >= config_.reacquire_after;
 }
 
+Eigen::Vector4d OffsetObserver::within_limits(const Eigen::Vector4d& offset) const {
+  return offset.cwiseMax(-config_.max_offset).cwiseMin(config_.max_offset);
+}
+
 void OffsetObserver::limit_offset(const Eigen::Matrix4d& jacobian) {
-  const Eigen::Vector4d within = offset_.cwiseMax(-config_.max_offset).cwiseMin(config_.max_offset);
+  const Eigen::Vector4d within = within_limits(offset_);
   feature_offset_ += jacobian * (offset_ - within);
   offset_ = within;
 }

@@ -74,6 +74,7 @@ class OffsetObserver {
 
   Update start(const FeatureModel& model, const Eigen::Vector4d& q_driven_then, const ImageMeasurement& image);
   bool agrees_with_last_outlier(const Eigen::Vector4d& seen_offset, const Eigen::Matrix4d& innovation_covariance);
+  Eigen::Vector4d within_limits(const Eigen::Vector4d& offset) const;
   void limit_offset(const Eigen::Matrix4d& jacobian);
   void follow_delay(double interval_s);
   void follow_measured(const JointHistory& history, double time_s, const Eigen::Vector4d& q_then);

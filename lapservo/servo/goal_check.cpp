@@ -95,9 +95,11 @@ void refuse_goal(const Trajectory& goal, double duration_s, const Rig& rig,
   const auto steps = static_cast<long>(std::ceil(duration_s / step_s));
   for (long i = 0; i <= steps; ++i) {
     const double time_s = step_s * static_cast<double>(i);
-    const TipGoal wanted = goal.tip_at(time_s).value();
-    if (const auto why = reach.broken(wanted, features.at(time_s).rate))
-      throw InputError(source, Infeasible{time_s, *why}.text() + reach.nearest_text(wanted));
+    const auto wanted = goal.tip_at(time_s);
+    if (!wanted)
+      throw InputError(source, fmt::format("has no goal of the tip at {:.2f} s, expected one at any time", time_s));
+    if (const auto why = reach.broken(*wanted, features.at(time_s).rate))
+      throw InputError(source, Infeasible{time_s, *why}.text() + reach.nearest_text(*wanted));
   }
 }
 

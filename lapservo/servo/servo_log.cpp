@@ -2,7 +2,9 @@
 
 #include <array>
 #include <cerrno>
+#include <cmath>
 #include <cstdlib>
+#include <limits>
 #include <string>
 #include <utility>
 
@@ -184,7 +186,10 @@ std::optional<ImageMeasurement> read_image(const Row& row) {
   ImageMeasurement image;
   image.found = word == "found";
   image.time_s = row.number("image_time_s");
-  image.registration = static_cast<int>(row.number("image_registration"));
+  const double registration = row.number("image_registration");
+  if (!(std::abs(registration) <= std::numeric_limits<int>::max()))
+    row.complain("image_registration", "a whole number");
+  image.registration = static_cast<int>(registration);
   const auto repetition = repetition_from_string(row.text("image_repetition"));
   if (!repetition) row.complain("image_repetition", "none, possible_at_rest or of_a_noisy_camera");
   image.repetition = *repetition;
