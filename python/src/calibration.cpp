@@ -1,5 +1,4 @@
 #include <filesystem>
-#include <memory>
 #include <optional>
 #include <string>
 #include <system_error>
@@ -112,11 +111,8 @@ py::dict calibrate_camera(const py::list& pictures, const std::string& corners, 
       complaint.append(complaint.empty() ? "" : "; ").append(several ? frames.name + ": " : "").append(latest);
   }
   const std::vector<std::string> without_board = recordings.without_board();
-  CameraMeasurement measured;
-  {
-    const py::gil_scoped_release others_run;
-    measured = measure_camera(board, std::move(recordings), before, watch);
-  }
+  const CameraMeasurement measured =
+      unlocked([&] { return measure_camera(board, std::move(recordings), before, watch); });
   const CameraCalibration& calibration = measured.calibration;
   expect_result(calibration.refusal, name);
   const Camera camera = measured_camera(calibration);
@@ -142,12 +138,10 @@ py::dict calibrate_colour(const py::object& frames, const py::object& rig, const
   const GivenRig given = rig_of(rig);
   const std::size_t index = index_of(given, instrument);
   const GivenFrames source(frames, fps, &given.rig.camera, deinterlace);
-  ColourMeasurement measured;
-  {
-    const py::gil_scoped_release others_run;
-    measured = measure_colour(given.rig, index, {*source.source, source.name, deinterlace}, replace_response,
-                              watch_of(progress));
-  }
+  const JobWatch watch = watch_of(progress);
+  const ColourMeasurement measured = unlocked([&] {
+    return measure_colour(given.rig, index, {*source.source, source.name, deinterlace}, replace_response, watch);
+  });
   const ColourCalibration& calibration = measured.calibration;
   expect_result(calibration.refusal, source.name);
   const Instrument& before = given.rig.instruments[index];
@@ -210,11 +204,10 @@ py::dict calibrate_marker(const py::object& frames, const py::object& rig, const
   std::optional<JointsOfTurn> turn;
   if (auto read = joints_of(joints, before, given.name())) turn = {std::move(read->recording), read->source};
   const GivenFrames source(frames, fps, &given.rig.camera, deinterlace);
-  MarkerMeasurement measured;
-  {
-    const py::gil_scoped_release others_run;
-    measured = measure_marker(given.rig, index, {*source.source, source.name, deinterlace}, turn, watch_of(progress));
-  }
+  const JobWatch watch = watch_of(progress);
+  const MarkerMeasurement measured = unlocked([&] {
+    return measure_marker(given.rig, index, {*source.source, source.name, deinterlace}, turn, watch);
+  });
   const MarkerCalibration& calibration = measured.calibration;
   expect_result(calibration.refusal, source.name);
   GivenRig after = given;

@@ -1,11 +1,9 @@
 #include "python/src/conversions.h"
 
-#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>

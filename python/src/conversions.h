@@ -1,6 +1,7 @@
 #pragma once
 #include <algorithm>
 #include <array>
+#include <concepts>
 #include <cstddef>
 #include <optional>
 #include <pybind11/eigen.h>
@@ -27,6 +28,13 @@ using Image = py::array_t<std::uint8_t>;
 /// The same pixels, not copied: valid as long as the array is. Rows may lie apart, pixels of a row may not. Throws
 /// InputError naming `argument` for anything else.
 cv::Mat view_of(const py::handle& image, const char* argument);
+/// Does what does not need Python while its other threads run.
+template <typename Job>
+auto unlocked(Job job) {
+  const py::gil_scoped_release others_run;
+  return job();
+}
+
 /// An array that owns the image.
 Image array_of(const cv::Mat& bgr);
 
@@ -110,15 +118,9 @@ std::array<double, Size> std_array(const Array<name, Size>& given) {
 }  // namespace lapservo::python
 
 namespace pybind11::detail {
-template <lapservo::python::Name name, int Rows, int Columns, lapservo::python::Numbers numbers>
-struct type_caster<lapservo::python::Array<name, Rows, Columns, numbers>>
-    : lapservo::python::ArgumentCaster<lapservo::python::Array<name, Rows, Columns, numbers>> {};
-template <lapservo::python::Name name>
-struct type_caster<lapservo::python::Pose<name>> : lapservo::python::ArgumentCaster<lapservo::python::Pose<name>> {};
-template <lapservo::python::Name name, lapservo::python::Numbers numbers>
-struct type_caster<lapservo::python::Number<name, numbers>>
-    : lapservo::python::ArgumentCaster<lapservo::python::Number<name, numbers>> {};
-template <lapservo::python::Name name>
-struct type_caster<lapservo::python::Picture<name>>
-    : lapservo::python::ArgumentCaster<lapservo::python::Picture<name>> {};
+template <typename Argument>
+requires requires(handle given) {
+  { Argument::of(given) } -> std::same_as<Argument>;
+}
+struct type_caster<Argument> : lapservo::python::ArgumentCaster<Argument> {};
 }  // namespace pybind11::detail

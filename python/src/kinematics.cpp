@@ -1,5 +1,4 @@
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 

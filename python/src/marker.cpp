@@ -1,6 +1,5 @@
 #include "lapservo/marker/marker.h"
 
-#include <stdexcept>
 #include <string>
 
 #include "lapservo/core/error.h"
@@ -63,8 +62,7 @@ void bind_marker(py::module_& m) {
            py::arg("bands_lower_m"), py::arg("hues_deg") = usual.hues_deg, py::arg("seam_rad") = 0.0,
            py::arg("tolerance_m") = 0.0, py::arg("wrap_m") = 0.0, py::arg("skew_m") = 0.0, py::arg("gap_rad") = 0.0,
            "Lengths in metres: of the bands at tau = 0 and at the print's other end. InputError for what is no marker "
-           "or "
-           "can't be decoded.")
+           "or can't be decoded.")
       .def_readonly("diameter_m", &Marker::diameter_m)
       .def_readonly("hues_deg", &Marker::hues_deg)
       .def_readonly("bands_upper_m", &Marker::bands_upper_m)
@@ -108,8 +106,7 @@ void bind_marker(py::module_& m) {
         spec.hues_deg = std_array(hues_deg);
         spec.viewing.focal_px = focal_px, spec.viewing.distance_m = distance_m;
         spec.print_error_m = print_error_m;
-        const py::gil_scoped_release others_run;
-        return design_marker(spec);
+        return unlocked([&] { return design_marker(spec); });
       },
       py::arg("diameter_m"), py::kw_only(), py::arg("length_m") = py::none(), py::arg("min_band_m") = py::none(),
       py::arg("hues_deg") = usual.hues_deg, py::arg("focal_px") = Viewing{}.focal_px,

@@ -1,5 +1,4 @@
 #include <exception>
-#include <stdexcept>
 
 #include "lapservo/core/error.h"
 #include "python/src/bindings.h"

@@ -1,7 +1,6 @@
 #include "python/src/python_frames.h"
 
 #include <cmath>
-#include <utility>
 
 #include <fmt/format.h>
 

@@ -104,10 +104,8 @@ matrix.)");
            py::arg("chromatic_aberration") = std::pair(1.0, 1.0), py::arg("deinterlace") = false,
            py::arg("sigma_response") = py::none(),
            "matrix: float[3, 3] in px; distortion: k1 k2 p1 p2 k3 as OpenCV has them (k3 or all may be left out, zeros "
-           "may "
-           "follow); response: 'srgb', 'rec709', 'linear', a power, or "
-           "(light, value); chromatic_aberration: magnification of blue and of red beside green's; "
-           "sigma_response: of a response that was measured.")
+           "may follow); response: 'srgb', 'rec709', 'linear', a power, or (light, value); chromatic_aberration: "
+           "magnification of blue and of red beside green's; sigma_response: of a response that was measured.")
       .def_readonly("width_px", &Camera::width_px)
       .def_readonly("height_px", &Camera::height_px)
       .def_property_readonly("matrix", &matrix_of_camera, "float[3, 3], px")

@@ -122,9 +122,7 @@ is sent.)")
            py::keep_alive<1, 5>(),
            "arm: its namespace, 'PSM1'; rig: with the arm's joints; controller: whose limits no setpoint exceeds, of "
            "joint_limits; enable_motion: else nothing is sent; setpoint_readers: nodes that may read servo_jp, the "
-           "arm's "
-           "and others; wait_s: for the arm's joints, without which InputError "
-           "is raised.");
+           "arm's and others; wait_s: for the arm's joints, without which InputError is raised.");
   py::class_<Ros2Camera, ImageStream>(m, "Ros2Camera", "The newest image of a topic of ROS 2.")
       .def(py::init([](const std::string& topic, const Rig& rig, const SteadyClock& clock) {
              return std::make_unique<Ros2Camera>(topic, rig.camera, clock);

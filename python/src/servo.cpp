@@ -1,10 +1,8 @@
 #include <filesystem>
-#include <functional>
 #include <memory>
 #include <pybind11/functional.h>
 #include <string>
 #include <utility>
-#include <variant>
 #include <vector>
 
 #include <fmt/format.h>
@@ -103,10 +101,9 @@ void bind_ports(py::module_& m) {
            py::arg("started") = false, py::arg("blocked") = "none", py::arg("wrist_rad") = std::vector<double>(),
            "time_s: when the joints were read, on the loop's clock; q: float[4], theta, phi [rad], rho [m], psi [rad]; "
            "operating_state: CRTK's word; follows: False where nothing that is sent moves the arm, and the loop only "
-           "says "
-           "what it would do; started: the operator has said start since the last state, which a held loop waits for; "
-           "blocked: why else the arm must not be moved, for example 'busy' or 'not_homed'; wrist_rad: readings of the "
-           "instrument's wrist_joints, in their order, without which its tip is not known.")
+           "says what it would do; started: the operator has said start since the last state, which a held loop waits "
+           "for; blocked: why else the arm must not be moved, for example 'busy' or 'not_homed'; wrist_rad: readings "
+           "of the instrument's wrist_joints, in their order, without which its tip is not known.")
       .def_readonly("time_s", &JointState::time_s)
       .def_property_readonly(
           "q", [](const JointState& self) { return self.q.vector(); }, "float[4]")
@@ -137,17 +134,13 @@ own rate, and forgets it as soon as it is not enabled.)")
       .def(
           "readings",
           [](Robot& self) {
-            auto readings = [&self] {
-              const py::gil_scoped_release others_run;
-              return self.readings();
-            }();
+            const auto readings = unlocked([&] { return self.readings(); });
             std::vector<std::pair<double, Eigen::Vector4d>> pairs;
             for (const JointReading& reading : readings) pairs.emplace_back(reading.time_s, reading.q.vector());
             return pairs;
           },
           "list of (time_s, float[4]): of the joints, all since the last call, for an arm that reads them more often "
-          "than "
-          "the loop calls it. May be left out.")
+          "than the loop calls it. May be left out.")
       .def("send", &Robot::send, py::arg("path"), py::call_guard<py::gil_scoped_release>(),
            "Follow this JointPath from now on; it is yours.")
       .def("release", &Robot::release, py::call_guard<py::gil_scoped_release>(),
@@ -159,10 +152,7 @@ own rate, and forgets it as soon as it is not enabled.)")
       .def(
           "newest",
           [](ImageStream& self) -> std::optional<std::pair<double, Image>> {
-            auto image = [&self] {
-              const py::gil_scoped_release others_run;
-              return self.newest();
-            }();
+            const auto image = unlocked([&] { return self.newest(); });
             if (!image) return std::nullopt;
             return std::pair(image->time_s, array_of(image->bgr));
           },
@@ -270,17 +260,6 @@ Controller make_controller(const Rig& rig, const std::string& mode, const std::o
   return config;
 }
 
-class PythonObserver : public RunObserver {
- public:
-  PythonObserver(py::object on_tick, std::shared_ptr<const Rig> rig)
-      : on_tick_(std::move(on_tick)), rig_(std::move(rig)) {}
-  bool on_tick(const ControlTick& tick) override;
-
- private:
-  py::object on_tick_;
-  std::shared_ptr<const Rig> rig_;
-};
-
 // A tick as Python keeps it.
 struct Tick {
   ControlTick tick;
@@ -296,14 +275,23 @@ struct Tick {
   }
 };
 
-// False ends the run; so does Ctrl-C.
-bool PythonObserver::on_tick(const ControlTick& tick) {
-  const py::gil_scoped_acquire mine;
-  if (PyErr_CheckSignals() != 0) throw py::error_already_set();
-  if (on_tick_.is_none()) return true;
-  const py::object answer = on_tick_(Tick{tick, rig_});
-  return answer.is_none() || answer.cast<bool>();
-}
+class PythonObserver : public RunObserver {
+ public:
+  PythonObserver(py::object on_tick, std::shared_ptr<const Rig> rig)
+      : on_tick_(std::move(on_tick)), rig_(std::move(rig)) {}
+  // False ends the run; so does Ctrl-C.
+  bool on_tick(const ControlTick& tick) override {
+    const py::gil_scoped_acquire mine;
+    if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+    if (on_tick_.is_none()) return true;
+    const py::object answer = on_tick_(Tick{tick, rig_});
+    return answer.is_none() || answer.cast<bool>();
+  }
+
+ private:
+  py::object on_tick_;
+  std::shared_ptr<const Rig> rig_;
+};
 
 void bind_tick(py::module_& m) {
   py::class_<Tick>(m, "ControlTick", "One control tick: what the loop went by and what it decided.")
@@ -381,15 +369,13 @@ void bind_servo(py::module_& m) {
   bind_ports(m);
   bind_trajectories(m);
   py::class_<Controller>(m, "Controller", "How a loop steers.")
-      .def(
-          py::init(&make_controller), py::arg("rig"), py::kw_only(), py::arg("mode") = "fused",
-          py::arg("path") = py::none(), py::arg("period_s") = ControllerConfig{}.period_s,
-          py::arg("gains_per_s") = py::none(), py::arg("delay_s") = py::none(), py::arg("window_margin_px") = 20.0,
-          py::arg("joint_limits") = py::none(),
-          "mode: 'fused', 'paper' or 'uncalibrated'; path: a controller.yaml, read over the rest; delay_s: known, else "
-          "estimated; joint_limits: the path of a file of the arm's, as configs/joint_limits/psm-classic.yaml, or "
-          "lower, "
-          "upper, rate and acceleration of q, float[4] each.")
+      .def(py::init(&make_controller), py::arg("rig"), py::kw_only(), py::arg("mode") = "fused",
+           py::arg("path") = py::none(), py::arg("period_s") = ControllerConfig{}.period_s,
+           py::arg("gains_per_s") = py::none(), py::arg("delay_s") = py::none(), py::arg("window_margin_px") = 20.0,
+           py::arg("joint_limits") = py::none(),
+           "mode: 'fused', 'paper' or 'uncalibrated'; path: a controller.yaml, read over the rest; delay_s: known, "
+           "else estimated; joint_limits: the path of a file of the arm's, as configs/joint_limits/psm-classic.yaml, "
+           "or lower, upper, rate and acceleration of q, float[4] each.")
       .def_property_readonly("mode", [](const Controller& self) { return std::string(to_string(self.mode)); })
       .def_property_readonly("period_s", [](const Controller& self) { return self.period_s; })
       .def(

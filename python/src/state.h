@@ -16,78 +16,59 @@
 // Copies, pickles and comparisons of values, by their members.
 namespace lapservo::python {
 
-inline auto members(Rigid3& v) {
-  return std::tie(v.rotation.coeffs(), v.translation);
-}
-inline auto members(JointVector& v) {
-  return std::tie(v.theta_rad, v.phi_rad, v.rho_m, v.psi_rad);
-}
-inline auto members(CameraSigmas& v) {
-  return std::tie(v.fx_px, v.fy_px, v.cx_px, v.cy_px, v.distortion, v.blue, v.red);
-}
-inline auto members(ChromaticAberration& v) {
-  return std::tie(v.blue, v.red);
-}
-inline auto members(Response& v) {
-  return std::tie(v.kind, v.gamma, v.table_light, v.table_value, v.sigma, v.sigma_light, v.sigma_value);
-}
-inline auto members(Camera& v) {
-  return std::tie(v.width_px, v.height_px, v.fx_px, v.fy_px, v.cx_px, v.cy_px, v.distortion, v.response, v.deinterlace,
-                  v.chromatic_aberration, v.sigmas);
-}
-inline auto members(MarkerSigmas& v) {
-  return std::tie(v.diameter_m, v.hues_deg, v.bands_upper_m, v.bands_lower_m, v.seam_rad, v.wrap_m, v.skew_m, v.gap_rad,
-                  v.tolerance_m);
-}
-inline auto members(Marker& v) {
-  return std::tie(v.diameter_m, v.hues_deg, v.bands_upper_m, v.bands_lower_m, v.seam_rad, v.tolerance_m, v.wrap_m,
-                  v.skew_m, v.gap_rad, v.sigmas);
-}
-inline auto members(Joints& v) {
-  return std::tie(v.names, v.sign, v.offset, v.sigma_offset);
-}
-inline auto members(WristJoint& v) {
-  return std::tie(v.name, v.alpha_rad, v.a_m, v.theta_rad, v.d_m, v.offset_rad, v.sigma_reading_rad);
-}
-inline auto members(Tool::Place& v) {
-  return std::tie(v.base_in_marker_m, v.azimuth_rad, v.covariance);
-}
-inline auto members(Tool& v) {
-  return std::tie(v.wrist, v.last_from_tip, v.snake_like, v.place, v.file);
-}
-inline auto members(Instrument& v) {
-  return std::tie(v.name, v.marker, v.camera_from_rcm, v.joints, v.image_delay_s, v.sigma_translation_m,
-                  v.sigma_quaternion_xyzw, v.registration_covariance, v.sigma_image_delay_s, v.tool);
-}
-inline auto members(Rig& v) {
-  return std::tie(v.camera, v.instruments, v.camera_file);
-}
-inline auto members(Observation::Rcm& v) {
-  return std::tie(v.q, v.covariance);
-}
-inline auto members(Observation::MarkerPose& v) {
-  return std::tie(v.camera_from_marker, v.sigma_xy_m, v.sigma_z_m, v.sigma_axis_rad, v.sigma_roll_rad, v.covariance);
-}
-inline auto members(Observation::Tip& v) {
-  return std::tie(v.camera_from_tip, v.covariance, v.sigma_shaft_m, v.sigma_place_m, v.sigma_readings_m);
-}
-inline auto members(Observation::Refused& v) {
-  return std::tie(v.what, v.camera_from_unrolled, v.psi_rad, v.edges_raw_px);
-}
-inline auto members(Features& v) {
-  return std::tie(v.s_rad, v.r_px, v.l_px, v.d_px, v.cross_ratio);
-}
-inline auto members(Observation& v) {
-  return std::tie(v.status, v.instrument, v.rcm, v.marker, v.tau_rad, v.sigma_tau_rad, v.edges_ideal_px, v.edges_raw_px,
-                  v.edges_covariance_px2, v.features, v.camera_from_unrolled, v.psi_rad, v.p_false, v.refused, v.tip);
-}
-inline auto members(Frame& v) {
-  return std::tie(v.bgr, v.index, v.time_s, v.file, v.flaw);
-}
+struct Members {
+  static auto of(Rigid3& v) { return std::tie(v.rotation.coeffs(), v.translation); }
+  static auto of(JointVector& v) { return std::tie(v.theta_rad, v.phi_rad, v.rho_m, v.psi_rad); }
+  static auto of(CameraSigmas& v) { return std::tie(v.fx_px, v.fy_px, v.cx_px, v.cy_px, v.distortion, v.blue, v.red); }
+  static auto of(ChromaticAberration& v) { return std::tie(v.blue, v.red); }
+  static auto of(Response& v) {
+    return std::tie(v.kind, v.gamma, v.table_light, v.table_value, v.sigma, v.sigma_light, v.sigma_value);
+  }
+  static auto of(Camera& v) {
+    return std::tie(v.width_px, v.height_px, v.fx_px, v.fy_px, v.cx_px, v.cy_px, v.distortion, v.response,
+                    v.deinterlace, v.chromatic_aberration, v.sigmas);
+  }
+  static auto of(MarkerSigmas& v) {
+    return std::tie(v.diameter_m, v.hues_deg, v.bands_upper_m, v.bands_lower_m, v.seam_rad, v.wrap_m, v.skew_m,
+                    v.gap_rad, v.tolerance_m);
+  }
+  static auto of(Marker& v) {
+    return std::tie(v.diameter_m, v.hues_deg, v.bands_upper_m, v.bands_lower_m, v.seam_rad, v.tolerance_m, v.wrap_m,
+                    v.skew_m, v.gap_rad, v.sigmas);
+  }
+  static auto of(Joints& v) { return std::tie(v.names, v.sign, v.offset, v.sigma_offset); }
+  static auto of(WristJoint& v) {
+    return std::tie(v.name, v.alpha_rad, v.a_m, v.theta_rad, v.d_m, v.offset_rad, v.sigma_reading_rad);
+  }
+  static auto of(Tool::Place& v) { return std::tie(v.base_in_marker_m, v.azimuth_rad, v.covariance); }
+  static auto of(Tool& v) { return std::tie(v.wrist, v.last_from_tip, v.snake_like, v.place, v.file); }
+  static auto of(Instrument& v) {
+    return std::tie(v.name, v.marker, v.camera_from_rcm, v.joints, v.image_delay_s, v.sigma_translation_m,
+                    v.sigma_quaternion_xyzw, v.registration_covariance, v.sigma_image_delay_s, v.tool);
+  }
+  static auto of(Rig& v) { return std::tie(v.camera, v.instruments, v.camera_file); }
+  static auto of(Observation::Rcm& v) { return std::tie(v.q, v.covariance); }
+  static auto of(Observation::MarkerPose& v) {
+    return std::tie(v.camera_from_marker, v.sigma_xy_m, v.sigma_z_m, v.sigma_axis_rad, v.sigma_roll_rad, v.covariance);
+  }
+  static auto of(Observation::Tip& v) {
+    return std::tie(v.camera_from_tip, v.covariance, v.sigma_shaft_m, v.sigma_place_m, v.sigma_readings_m);
+  }
+  static auto of(Observation::Refused& v) {
+    return std::tie(v.what, v.camera_from_unrolled, v.psi_rad, v.edges_raw_px);
+  }
+  static auto of(Features& v) { return std::tie(v.s_rad, v.r_px, v.l_px, v.d_px, v.cross_ratio); }
+  static auto of(Observation& v) {
+    return std::tie(v.status, v.instrument, v.rcm, v.marker, v.tau_rad, v.sigma_tau_rad, v.edges_ideal_px,
+                    v.edges_raw_px, v.edges_covariance_px2, v.features, v.camera_from_unrolled, v.psi_rad, v.p_false,
+                    v.refused, v.tip);
+  }
+  static auto of(Frame& v) { return std::tie(v.bgr, v.index, v.time_s, v.file, v.flaw); }
+};
 
 template <typename T>
 concept HasMembers = requires(T& value) {
-  members(value);
+  Members::of(value);
 };
 template <typename T>
 constexpr bool is_optional = false;
@@ -98,7 +79,7 @@ constexpr bool is_optional<std::optional<T>> = true;
 template <typename T>
 py::object state_of(T value) {
   if constexpr (HasMembers<T>) {
-    return std::apply([](const auto&... all) { return py::make_tuple(state_of(all)...); }, members(value));
+    return std::apply([](const auto&... all) { return py::make_tuple(state_of(all)...); }, Members::of(value));
   } else if constexpr (is_optional<T>) {
     return value ? state_of(*value) : py::none();
   } else if constexpr (std::is_enum_v<T>) {
@@ -117,7 +98,7 @@ void set_state(const py::handle& state, T& value) {
   if constexpr (HasMembers<T>) {
     const auto all = py::reinterpret_borrow<py::tuple>(state);
     std::size_t i = 0;
-    std::apply([&](auto&... each) { (set_state(all[i++], each), ...); }, members(value));
+    std::apply([&](auto&... each) { (set_state(all[i++], each), ...); }, Members::of(value));
   } else if constexpr (is_optional<T>) {
     if (state.is_none()) return;
     typename T::value_type held{};
@@ -145,9 +126,9 @@ bool equal(T a, T b) {
   } else {
     return std::apply(
         [&](const auto&... of_a) {
-          return std::apply([&](const auto&... of_b) { return (equal(of_a, of_b) && ...); }, members(b));
+          return std::apply([&](const auto&... of_b) { return (equal(of_a, of_b) && ...); }, Members::of(b));
         },
-        members(a));
+        Members::of(a));
   }
 }
 

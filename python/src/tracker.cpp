@@ -4,7 +4,6 @@
 #include <mutex>
 #include <string>
 #include <utility>
-#include <variant>
 #include <vector>
 
 #include <fmt/format.h>
@@ -77,25 +76,18 @@ std::string summary(const Observed& seen) {
   const Observation& o = seen.observation;
   std::string text = o.instrument + ": " + std::string(to_string(o.status));
   if (!is_ok(seen)) return text;
-  char numbers[160];
-  std::snprintf(numbers, sizeof numbers, ", tau %.4f rad (sigma %.1f mrad)", o.tau_rad, 1e3 * o.sigma_tau_rad);
-  text += numbers;
+  text += fmt::format(", tau {:.4f} rad (sigma {:.1f} mrad)", o.tau_rad, 1e3 * o.sigma_tau_rad);
   if (!o.rcm) return text;
   const JointVector& q = o.rcm->q;
-  std::snprintf(numbers, sizeof numbers, ", q = [%.4f rad, %.4f rad, %.5f m, %.4f rad]", q.theta_rad, q.phi_rad,
-                q.rho_m, q.psi_rad);
-  return text + numbers;
+  return text + fmt::format(", q = [{:.4f} rad, {:.4f} rad, {:.5f} m, {:.4f} rad]", q.theta_rad, q.phi_rad, q.rho_m,
+                            q.psi_rad);
 }
 
 Image overlay(const Observed& seen, const Picture<"image">& image) {
-  const py::gil_scoped_release others_run;
-  std::vector<Observation> all(1, seen.observation);
   Rig rig{seen.rig->camera, {}, {}};
   if (const auto index = internal::instrument_index(*seen.rig, seen.observation.instrument))
     rig.instruments.push_back(seen.rig->instruments[*index]);
-  const cv::Mat drawn = draw_overlay(image.bgr, rig, all);
-  const py::gil_scoped_acquire mine;
-  return array_of(drawn);
+  return array_of(unlocked([&] { return draw_overlay(image.bgr, rig, {seen.observation}); }));
 }
 
 py::tuple state_of_observed(const Observed& seen) {

@@ -27,7 +27,6 @@
 #include "apps/lapservo/inputs/transports.h"
 #include "cameras/live_source.h"
 #include "lapservo/calibration/check/frame_diagnosis.h"
-#include "lapservo/calibration/check/usual_cause.h"
 #include "lapservo/core/error.h"
 #include "lapservo/crtk/transport.h"
 #include "lapservo/crtk/wrist_history.h"

@@ -1,10 +1,13 @@
 #include "lapservo/calibration/camera/board.h"
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
+#include <iterator>
 #include <optional>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <opencv2/aruco/charuco.hpp>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
@@ -12,36 +15,22 @@
 namespace lapservo::internal {
 namespace {
 
-struct NamedDictionary {
-  const char* name;
-  int number;
-};
-constexpr std::array<NamedDictionary, 17> dictionaries{{{"DICT_4X4_50", cv::aruco::DICT_4X4_50},
-                                                        {"DICT_4X4_100", cv::aruco::DICT_4X4_100},
-                                                        {"DICT_4X4_250", cv::aruco::DICT_4X4_250},
-                                                        {"DICT_4X4_1000", cv::aruco::DICT_4X4_1000},
-                                                        {"DICT_5X5_50", cv::aruco::DICT_5X5_50},
-                                                        {"DICT_5X5_100", cv::aruco::DICT_5X5_100},
-                                                        {"DICT_5X5_250", cv::aruco::DICT_5X5_250},
-                                                        {"DICT_5X5_1000", cv::aruco::DICT_5X5_1000},
-                                                        {"DICT_6X6_50", cv::aruco::DICT_6X6_50},
-                                                        {"DICT_6X6_100", cv::aruco::DICT_6X6_100},
-                                                        {"DICT_6X6_250", cv::aruco::DICT_6X6_250},
-                                                        {"DICT_6X6_1000", cv::aruco::DICT_6X6_1000},
-                                                        {"DICT_7X7_50", cv::aruco::DICT_7X7_50},
-                                                        {"DICT_7X7_100", cv::aruco::DICT_7X7_100},
-                                                        {"DICT_7X7_250", cv::aruco::DICT_7X7_250},
-                                                        {"DICT_7X7_1000", cv::aruco::DICT_7X7_1000},
-                                                        {"DICT_ARUCO_ORIGINAL", cv::aruco::DICT_ARUCO_ORIGINAL}}};
+// In the order of OpenCV's numbers for them.
+constexpr std::array dictionaries{
+    "DICT_4X4_50",  "DICT_4X4_100",  "DICT_4X4_250", "DICT_4X4_1000", "DICT_5X5_50",        "DICT_5X5_100",
+    "DICT_5X5_250", "DICT_5X5_1000", "DICT_6X6_50",  "DICT_6X6_100",  "DICT_6X6_250",       "DICT_6X6_1000",
+    "DICT_7X7_50",  "DICT_7X7_100",  "DICT_7X7_250", "DICT_7X7_1000", "DICT_ARUCO_ORIGINAL"};
+static_assert(cv::aruco::DICT_4X4_50 == 0 && cv::aruco::DICT_ARUCO_ORIGINAL + 1 == std::ssize(dictionaries));
 
 std::optional<cv::aruco::Dictionary> dictionary_of(const Board& board) {
-  for (const auto& [name, number] : dictionaries)
+  const auto at = std::find(dictionaries.begin(), dictionaries.end(), board.dictionary);
+  if (at == dictionaries.end()) return {};
+  const auto number = static_cast<int>(at - dictionaries.begin());
 #if CV_VERSION_MAJOR > 4 || (CV_VERSION_MAJOR == 4 && CV_VERSION_MINOR >= 7)
-    if (board.dictionary == name) return cv::aruco::getPredefinedDictionary(number);
+  return cv::aruco::getPredefinedDictionary(number);
 #else
-    if (board.dictionary == name) return *cv::aruco::getPredefinedDictionary(number);
+  return *cv::aruco::getPredefinedDictionary(number);
 #endif
-  return {};
 }
 
 // OpenCV's search for a chessboard draws from its thread's random numbers: each image from the same ones, whatever
@@ -116,12 +105,9 @@ std::vector<BoardCorner> find_charuco(const Board& board, const cv::Mat& grey) {
 std::string board_problem(const Board& board) {
   if (board.dictionary.empty()) return {};
   const auto dictionary = dictionary_of(board);
-  if (!dictionary) {
-    std::string names;
-    for (const auto& [name, number] : dictionaries) names += names.empty() ? name : fmt::format(", {}", name);
+  if (!dictionary)
     return fmt::format("{} is no dictionary of ArUco markers that is known here, expected one of {}", board.dictionary,
-                       names);
-  }
+                       fmt::join(dictionaries, ", "));
   const int markers = (board.columns + 1) * (board.rows + 1) / 2;
   if (markers > dictionary->bytesList.rows)
     return fmt::format("{} has {} markers and the board {}", board.dictionary, dictionary->bytesList.rows, markers);

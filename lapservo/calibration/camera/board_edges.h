@@ -1,7 +1,9 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -9,6 +11,7 @@
 
 #include "lapservo/calibration/camera/board.h"
 #include "lapservo/geometry/camera.h"
+#include "lapservo/geometry/response.h"
 #include "lapservo/geometry/rigid3.h"
 
 namespace lapservo::internal {
@@ -56,5 +59,20 @@ struct BoardEdgeFit {
 
 /// nullopt where there is no such edge: too little contrast, saturated, or a fit that leaves it.
 std::optional<BoardEdgeFit> fit_edge(const EdgePixels& edge, int channel, const LightTable& light_of_value);
+
+/// A channel's encoded values (0 to 1) across an edge, from dark to bright, in steps of `profile_step_px` about the
+/// edge; NaN where there is none. Means of light, encoded again: noise comes before the response.
+struct BoardEdgeProfile {
+  std::vector<double> value, sigma;
+  std::vector<double> at_px, spread_px2;  ///< distances of a step's pixels: their mean and variance
+  double dark = 0, bright = 0;            ///< values of the squares beside it
+  double blur_px = 1;
+  double angle_rad = 0;  ///< between the edge and the nearer of rows and columns, 0 to pi/4
+};
+constexpr double profile_step_px = 0.5;
+
+/// The profile of an edge that was fitted in this channel; nullopt where it shows no two levels.
+std::optional<BoardEdgeProfile> profile_of(const EdgePixels& edge, const BoardEdgeFit& fit, int channel,
+                                           const Response& response);
 
 }  // namespace lapservo::internal

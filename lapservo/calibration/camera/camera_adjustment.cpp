@@ -5,6 +5,7 @@
 #include <ceres/rotation.h>
 #include <cmath>
 #include <cstddef>
+#include <tuple>
 #include <utility>
 
 #include "lapservo/calibration/fit/linear_fit.h"
@@ -181,13 +182,10 @@ Departures departures_at(ceres::Problem& problem, const FittedNumbers& fitted, c
   return departures_of(fit, slopes);
 }
 
-struct Sigmas {
-  CameraSigmas camera;
-  double aspect = 0;
-};
-
-std::optional<Sigmas> sigmas_of(ceres::Problem& problem, const CameraUnknowns& c, double scale,
-                                const FittedNumbers& fitted, const Eigen::MatrixXd& by_faults) {
+// Those of the camera's numbers, and that of fy / fx.
+std::optional<std::pair<CameraSigmas, double>> sigmas_of(ceres::Problem& problem, const CameraUnknowns& c, double scale,
+                                                         const FittedNumbers& fitted,
+                                                         const Eigen::MatrixXd& by_faults) {
   ceres::Covariance::Options options;
   options.algorithm_type = ceres::SPARSE_QR;
   ceres::Covariance covariance(options);
@@ -216,17 +214,15 @@ std::optional<Sigmas> sigmas_of(ceres::Problem& problem, const CameraUnknowns& c
   const Eigen::MatrixXd magnifications = read(c.magnifications.data(), c.magnifications.data(), 2);
   if (!finite) return std::nullopt;
   const auto sigma = [&](double variance) { return std::sqrt(std::max(0.0, variance)); };
-  Sigmas result;
-  CameraSigmas& sigmas = result.camera;
+  CameraSigmas sigmas;
   sigmas.fx_px = sigma(focal);
   sigmas.fy_px =
       sigma(c.aspect * c.aspect * focal + 2 * c.focal_px * c.aspect * focal_aspect + c.focal_px * c.focal_px * aspect);
-  result.aspect = sigma(aspect);
   sigmas.cx_px = sigma(centre(0, 0)), sigmas.cy_px = sigma(centre(1, 1));
   for (Eigen::Index i = 0; i < 4; ++i) sigmas.distortion[static_cast<std::size_t>(i)] = sigma(distortion(i, i));
   sigmas.distortion[4] = sigma(k3);
   sigmas.blue = sigma(magnifications(0, 0)), sigmas.red = sigma(magnifications(1, 1));
-  return result;
+  return std::pair(sigmas, sigma(aspect));
 }
 
 }  // namespace
@@ -296,7 +292,7 @@ std::optional<CameraAdjustment> adjust_camera(const Camera& start, const std::ve
   }
   const auto sigmas = sigmas_of(problem, camera, std::max(1.0, result.noise), fitted, by_faults);
   if (!sigmas) return std::nullopt;
-  result.sigmas = sigmas->camera, result.sigma_aspect = sigmas->aspect;
+  std::tie(result.sigmas, result.sigma_aspect) = *sigmas;
   return result;
 }
 

@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
+#include <limits>
+#include <set>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -50,13 +51,9 @@ Rigid3 pose_of(const cv::Mat& rotation_vector, const cv::Mat& translation) {
   return {rotation_by(vector_of(rotation_vector)), vector_of(translation)};
 }
 
-struct LensFit {
-  Camera camera;
-  std::vector<Rigid3> camera_from_board;
-};
-
-// By the corners alone, to start with: OpenCV's, without k3.
-std::optional<LensFit> first_fit(const Board& board, const std::vector<BoardView>& views, const Camera& start) {
+// By the corners alone, to start with: OpenCV's, without k3 and what else an adjustment finds.
+std::optional<CameraAdjustment> first_fit(const Board& board, const std::vector<BoardView>& views,
+                                          const Camera& start) {
   std::vector<std::vector<cv::Point3f>> on_board;
   std::vector<std::vector<cv::Point2f>> in_picture;
   for (const BoardView& view : views) {
@@ -65,7 +62,8 @@ std::optional<LensFit> first_fit(const Board& board, const std::vector<BoardView
   }
   cv::Mat matrix, distortion;
   std::vector<cv::Mat> rotations, translations;
-  LensFit fit{start, {}};
+  CameraAdjustment fit;
+  fit.camera = start;
   fit.camera.width_px = views.front().bgr.cols, fit.camera.height_px = views.front().bgr.rows;
   try {
     cv::calibrateCamera(on_board, in_picture, views.front().bgr.size(), matrix, distortion, rotations, translations,
@@ -104,8 +102,8 @@ struct MeasuredEdges {
 
 constexpr int green = 1;
 
-MeasuredEdges measured(const Board& board, const std::vector<BoardView>& views, const LensFit& fit, bool all_channels,
-                       bool with_profiles) {
+MeasuredEdges measured(const Board& board, const std::vector<BoardView>& views, const CameraAdjustment& fit,
+                       bool all_channels, bool with_profiles) {
   const LightTable light = fit.camera.response.table();
   MeasuredEdges result;
   for (std::size_t i = 0; i < views.size(); ++i) {
@@ -118,7 +116,7 @@ MeasuredEdges measured(const Board& board, const std::vector<BoardView>& views, 
         if (!edge_fit) continue;
         add_points(edge, *edge_fit, channel, points);
         if (channel != green || !with_profiles) continue;
-        if (auto profile = profile_of(edge, edge_fit->towards_bright, channel, edge_fit->blur_px, fit.camera.response))
+        if (auto profile = profile_of(edge, *edge_fit, channel, fit.camera.response))
           result.profiles.push_back(std::move(*profile));
       }
     }
@@ -127,7 +125,7 @@ MeasuredEdges measured(const Board& board, const std::vector<BoardView>& views, 
 }
 
 // Unobservable parameters stay zero: k3, and pixels that are not square.
-std::optional<CameraAdjustment> adjust_what_shows(const LensFit& fit, const MeasuredEdges& edges,
+std::optional<CameraAdjustment> adjust_what_shows(const CameraAdjustment& fit, const MeasuredEdges& edges,
                                                   const AtIteration& at_iteration) {
   CameraFreedom freedom{.faults = false};
   const auto all = adjust_camera(fit.camera, fit.camera_from_board, edges.points, freedom, at_iteration);
@@ -138,10 +136,6 @@ std::optional<CameraAdjustment> adjust_what_shows(const LensFit& fit, const Meas
       std::abs(camera.fy_px / camera.fx_px - 1) > std::max(square_pixels, significant_sigmas * all->sigma_aspect);
   freedom.faults = true;
   return adjust_camera(camera, all->camera_from_board, edges.points, freedom, at_iteration);
-}
-
-LensFit fit_of(const CameraAdjustment& adjustment) {
-  return {adjustment.camera, adjustment.camera_from_board};
 }
 
 void add_residuals(const CameraAdjustment& adjustment, const MeasuredEdges& edges, CameraCalibration& calibration) {
@@ -201,16 +195,13 @@ std::string text_of(CameraFault::Kind kind, double size, const std::string& wher
 
 // A sentence for each kind, the clearest first.
 std::vector<std::string> texts_of(const std::vector<CameraFault>& faults, const std::vector<BoardView>& views) {
-  std::vector<CameraFault::Kind> kinds;
+  std::set<CameraFault::Kind> told;
   std::vector<std::string> texts;
   for (const CameraFault& fault : faults) {
-    if (std::find(kinds.begin(), kinds.end(), fault.kind) != kinds.end()) continue;
-    kinds.push_back(fault.kind);
-    std::vector<std::string> where;
+    if (!told.insert(fault.kind).second) continue;
+    std::set<std::string> where;
     for (const CameraFault& other : faults)
-      if (other.kind == fault.kind) where.push_back(views[other.view].name);
-    std::sort(where.begin(), where.end());
-    where.erase(std::unique(where.begin(), where.end()), where.end());
+      if (other.kind == fault.kind) where.insert(views[other.view].name);
     texts.push_back(text_of(fault.kind, fault.size, fmt::format("{}", fmt::join(where, ", "))));
   }
   return texts;
@@ -282,8 +273,8 @@ bool BoardViews::add(const std::string& name, const cv::Mat& bgr, bool always) {
         if (a.column == b.column && a.row == b.row) most = std::max(most, (a.raw_px - b.raw_px).norm()), ++shared;
     return shared < 4 ? std::numeric_limits<double>::max() : most;
   };
-  const bool differs = std::all_of(views_.begin(), views_.end(),
-                                   [&](const BoardView& other) { return distance_px(other) > different * bgr.cols; });
+  const bool differs =
+      std::ranges::all_of(views_, [&](const BoardView& other) { return distance_px(other) > different * bgr.cols; });
   if (!always && (!differs || full())) return true;
   view.bgr = bgr.clone();
   views_.push_back(std::move(view));
@@ -332,19 +323,17 @@ CameraCalibration calibrate_camera(const Board& board, const std::vector<BoardVi
   if (!fit) return refuse("the views are too alike to determine the camera");
 
   // Edges about the fit, and the fit about the edges.
-  std::optional<CameraAdjustment> adjustment;
   constexpr int last_round = 1;
   for (int round = 0; round <= last_round; ++round) {
     told("edges in green");
     const auto points = measured(board, views, *fit, false, false).points;
-    if (std::all_of(points.begin(), points.end(), [](const auto& view) { return view.empty(); }))
+    if (std::ranges::all_of(points, [](const auto& view) { return view.empty(); }))
       return refuse("no edge between squares can be measured: they are overexposed, or narrower than some 14 px");
-    adjustment = adjust_camera(fit->camera, fit->camera_from_board, points,
-                               {.k3 = false, .faults = round == last_round}, at_iteration);
-    if (!adjustment) return refuse("the views are too alike to determine the camera");
-    fit = fit_of(*adjustment);
+    fit = adjust_camera(fit->camera, fit->camera_from_board, points, {.k3 = false, .faults = round == last_round},
+                        at_iteration);
+    if (!fit) return refuse("the views are too alike to determine the camera");
   }
-  if (const std::string why = refusal_of(*adjustment, views); !why.empty()) return refuse(why);
+  if (const std::string why = refusal_of(*fit, views); !why.empty()) return refuse(why);
   // Means are of light as the last round had it.
   constexpr int response_rounds = 2;
   for (int round = 0; round < response_rounds; ++round) {
@@ -359,14 +348,14 @@ CameraCalibration calibrate_camera(const Board& board, const std::vector<BoardVi
   }
   told("edges in all colours");
   const MeasuredEdges edges = measured(board, views, *fit, true, false);
-  adjustment = adjust_what_shows(*fit, edges, at_iteration);
-  if (!adjustment) return refuse("the views are too alike to determine the camera");
-  calibration.camera = rounded_by_sigmas(adjustment->camera, adjustment->sigmas);
-  calibration.sigmas = adjustment->sigmas;
-  calibration.bright_wider_px = adjustment->bright_wider_px[green];
-  add_residuals(*adjustment, edges, calibration);
-  calibration.noise = adjustment->noise, calibration.faults = texts_of(adjustment->faults, views);
-  if (const std::string why = refusal_of(*adjustment, views); !why.empty()) return refuse(why);
+  fit = adjust_what_shows(*fit, edges, at_iteration);
+  if (!fit) return refuse("the views are too alike to determine the camera");
+  calibration.camera = rounded_by_sigmas(fit->camera, fit->sigmas);
+  calibration.sigmas = fit->sigmas;
+  calibration.bright_wider_px = fit->bright_wider_px[green];
+  add_residuals(*fit, edges, calibration);
+  calibration.noise = fit->noise, calibration.faults = texts_of(fit->faults, views);
+  if (const std::string why = refusal_of(*fit, views); !why.empty()) return refuse(why);
   if (calibration.rms_px > max_rms_px)
     return refuse(fmt::format("edges miss the fit by {:.2f} px rms: {}", calibration.rms_px,
                               calibration.faults.empty()

@@ -4,11 +4,9 @@
 #include <array>
 #include <charconv>
 #include <system_error>
-#include <utility>
 
 #include <fmt/format.h>
 
-#include "lapservo/calibration/recording/frame_recording.h"
 #include "lapservo/core/error.h"
 #include "lapservo/core/rounded_sigma.h"
 
@@ -108,13 +106,12 @@ CameraMeasurement measure_camera(const Board& board, BoardRecordings recordings,
   if (read.stopped) return measured.calibration.refusal = "stopped", measured;
   measured.views = recordings.take_views();
   if (measured.views.empty()) {
-    measured.calibration.refusal =
-        read.all_damaged()
-            ? text_of_damaged(read.damaged, read.damaged)
-            : fmt::format(
-                  "the board is in none of {} images{}: look at the board's number of inner corners, show it wholly, "
-                  "sharp, with a white margin",
-                  read.looked_at, read.remark_on_damaged());
+    measured.calibration.refusal = read.all_damaged()
+                                       ? text_of_damaged(read.damaged, read.damaged)
+                                       : fmt::format(
+                                             "the board is in none of {} images{}: look at the board's number of inner "
+                                             "corners, show it wholly, sharp, with a white margin",
+                                             read.looked_at, read.remark_on_damaged());
     return measured;
   }
   int step = 0;
@@ -145,10 +142,9 @@ std::vector<CalibratedNumber> calibrated_numbers(const Camera& before, const Cam
   constexpr std::array names{"k1", "k2", "p1", "p2", "k3"};
   for (std::size_t i = 0; i < names.size(); ++i)
     numbers.push_back({names[i], before.distortion[i], after.distortion[i], sigmas.distortion[i]});
-  numbers.push_back(
-      {"magnification of blue", before.chromatic_aberration.blue, after.chromatic_aberration.blue, sigmas.blue});
-  numbers.push_back(
-      {"magnification of red", before.chromatic_aberration.red, after.chromatic_aberration.red, sigmas.red});
+  const ChromaticAberration &was = before.chromatic_aberration, &is = after.chromatic_aberration;
+  numbers.push_back({"magnification of blue", was.blue, is.blue, sigmas.blue});
+  numbers.push_back({"magnification of red", was.red, is.red, sigmas.red});
   return numbers;
 }
 

@@ -1,6 +1,5 @@
 #include "lapservo/calibration/camera/response_curve.h"
 
-#include <array>
 #include <cstddef>
 #include <vector>
 

@@ -212,6 +212,7 @@ double difference(const Response& a, const Response& b, double low, double high)
 struct Named {
   std::string name;
   Response response;
+  double evidence = 0;  // its logarithm, less the table's
 };
 
 std::vector<Named> named_responses() {
@@ -328,17 +329,16 @@ class ProfileFit {
   /// Curve, and sharpening where profiles can't be understood without. False when it does not settle.
   bool solve() {
     const auto start = std::tuple(shared_, shapes_, edges_);
-    if (!solve_for(false)) return false;
+    if (!run({nullptr, false})) return false;
     if (misfit() <= max_plain_misfit) return true;
     std::tie(shared_, shapes_, edges_) = start;  // without sharpening it went astray
-    return solve_for(true) && (shared_.strength >= least_strength || solve_for(false));
+    return run({nullptr, true}) && (shared_.strength >= least_strength || run({nullptr, false}));
   }
 
   /// The cost with a known response, without the curve's; what was fitted stays.
   std::optional<double> cost_with(const Response& response) {
     const auto fitted = std::tuple(shared_, shapes_, edges_);
-    given_.response = &response;
-    const bool usable = run();
+    const bool usable = run({&response, given_.sharpened});
     const double cost = summary_.final_cost - curve_cost();
     std::tie(shared_, shapes_, edges_) = fitted;
     given_.response = nullptr;
@@ -377,12 +377,9 @@ class ProfileFit {
     problem_.SetParameterLowerBound(&shared_.log_mask_px, 0, std::log(1.0));
     problem_.SetParameterUpperBound(&shared_.log_mask_px, 0, std::log(3.0));
   }
-  bool solve_for(bool sharpened) {
-    given_.sharpened = sharpened;
-    return run();
-  }
   // Given parameters are fixed.
-  bool run() {
+  bool run(const Given& given) {
+    given_ = given;
     const auto fix = [&](double* block, bool fixed) {
       if (fixed)
         problem_.SetParameterBlockConstant(block);
@@ -419,30 +416,25 @@ double log_volume(const CurveCovariance& covariance) {
   return eigenvalues_of_symmetric((whitened + whitened.transpose()) / 2).array().max(1e-12).log().sum() / 2;
 }
 
-struct Weighed {
-  Named named;
-  double evidence = 0;  // its logarithm, less the table's
-};
-
 // By Laplace's approximation. The other numbers' volumes are alike and cancel.
-std::vector<Weighed> weigh_named(ProfileFit& profiles, const CurvePosterior& posterior, double part) {
+std::vector<Named> weigh_named(ProfileFit& profiles, const CurvePosterior& posterior, double part) {
   const double of_table =
       -part * (profiles.cost() - profiles.curve_cost()) - posterior.cost + log_volume(posterior.covariance);
-  std::vector<Weighed> all;
-  for (const Named& named : named_responses())
-    if (const auto cost = profiles.cost_with(named.response))
-      all.push_back({named, named_log_odds - part * *cost - of_table});
+  std::vector<Named> all;
+  for (const auto& [name, response, unweighed] : named_responses())
+    if (const auto cost = profiles.cost_with(response))
+      all.push_back({name, response, named_log_odds - part * *cost - of_table});
   return all;
 }
 
 // A named response unless the profiles speak against it. Sigma is that of the mixture about the chosen one.
 void choose_response(ProfileFit& profiles, const CurvePosterior& posterior, double part, ResponseFit& fit) {
-  const std::vector<Weighed> all = weigh_named(profiles, posterior, part);
-  const auto best = std::max_element(all.begin(), all.end(),
-                                     [](const Weighed& a, const Weighed& b) { return a.evidence < b.evidence; });
+  const std::vector<Named> all = weigh_named(profiles, posterior, part);
+  const auto best = std::ranges::max_element(all, {}, &Named::evidence);
   if (best == all.end()) return;
-  fit.nearest = best->named.name;
-  if (best->evidence > 0) fit.response = best->named.response;
+  const Response table = fit.response;
+  fit.nearest = best->name;
+  if (best->evidence > 0) fit.response = best->response;
   const double most = std::max(0.0, best->evidence);
   double sum = 0, variance = 0;
   const auto add = [&](double evidence, const Response& response, double sigma) {
@@ -451,8 +443,8 @@ void choose_response(ProfileFit& profiles, const CurvePosterior& posterior, doub
     const double distance = difference(fit.response, response, fit.low, fit.high);
     sum += weight, variance += weight * (sigma * sigma + distance * distance);
   };
-  add(0, fit.table, fit.sigma);
-  for (const Weighed& one : all) add(one.evidence, one.named.response, named_sigma);
+  add(0, table, fit.sigma);
+  for (const Named& one : all) add(one.evidence, one.response, named_sigma);
   fit.sigma = std::sqrt(variance / sum);
 }
 
@@ -476,7 +468,7 @@ std::optional<ResponseFit> fit_response(const std::vector<BoardEdgeProfile>& pro
   if (!posterior) return std::nullopt;
   fit.sigma = sigma_of(*posterior, fit.low, fit.high);
   if (!std::isfinite(fit.sigma)) return std::nullopt;
-  fit.table = fit.response = rounded_by_sigma(table_of(posterior->curve), fit.sigma);
+  fit.response = rounded_by_sigma(table_of(posterior->curve), fit.sigma);
   if (try_named) choose_response(fitted, *posterior, part, fit);
   return fit;
 }

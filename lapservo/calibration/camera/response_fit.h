@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "lapservo/calibration/camera/board_edge_profile.h"
+#include "lapservo/calibration/camera/board_edges.h"
 #include "lapservo/calibration/fit/at_iteration.h"
 #include "lapservo/geometry/response.h"
 
@@ -13,7 +13,6 @@ namespace lapservo::internal {
 
 struct ResponseFit {
   Response response;  ///< a named one unless the edges speak against it, else a table
-  Response table;     ///< as it was fitted
   double sigma = 0;   ///< of encoded values (0 to 1), the largest over values that were seen, other responses included
   std::string nearest;                       ///< name of the most likely named response
   double low = 0, high = 1;                  ///< the values that were seen

@@ -2,11 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
 #include <Eigen/Geometry>
 
-#include "lapservo/calibration/check/rig_limits.h"
+#include "lapservo/calibration/check/rig_check.h"
 #include "lapservo/calibration/registration/arm_fit.h"
 #include "lapservo/calibration/registration/arm_start.h"
 #include "lapservo/core/angles.h"
@@ -20,12 +19,6 @@ namespace {
 
 // Smaller faults than these are not taken out of the others: they would widen them for nothing.
 constexpr double least_focal = 2e-3, least_drift_m = 0.5e-3, least_drift_rad = 2e-3;
-
-// The first of the faults that are fitted.
-Told focal_of(const ArmFit& f) {
-  const Eigen::Index focal = f.model.blocks().joints.first;
-  return {std::abs(f.fit.x[focal]), std::sqrt(f.covariance(focal, focal))};
-}
 
 // By how much the marker in the middle of its work moves in the camera over the recording.
 Told drift_of_place(const ArmFit& f) {
@@ -106,7 +99,8 @@ ArmCheck check_arm(const Instrument& instrument, const Camera& camera, const std
   const std::vector<JointFault> focal{focal_fault()};
   const auto full = fit_arm(instrument, start, recording, {true, focal});
   if (!full) return check.refusal = std::string("the motion leaves the registration open: ") + swing_more, check;
-  check.focal = focal_of(*full);
+  const Eigen::Index first = full->model.blocks().joints.first;  // of the faults that are fitted
+  check.focal = {std::abs(full->fit.x[first]), std::sqrt(full->covariance(first, first))};
   check.drift_m = drift_of_place(*full), check.drift_rad = drift_of_directions(*full);
   const ArmFaults there{check.drift_m.exceeds(least_drift_m) || check.drift_rad.exceeds(least_drift_rad),
                         check.focal.exceeds(least_focal) ? focal : std::vector<JointFault>{}};

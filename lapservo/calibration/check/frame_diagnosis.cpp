@@ -1,19 +1,14 @@
 #include "lapservo/calibration/check/frame_diagnosis.h"
 
 #include <algorithm>
-#include <functional>
 #include <iterator>
-#include <optional>
-#include <utility>
 
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
 
-#include "lapservo/calibration/check/other_bands.h"
 #include "lapservo/calibration/check/other_readings.h"
-#include "lapservo/calibration/check/usual_cause.h"
+#include "lapservo/calibration/colour/light.h"
 #include "lapservo/calibration/recording/frame_recording.h"
-#include "lapservo/calibration/recording/picture_light.h"
 #include "lapservo/calibration/registration/timed_pose.h"
 #include "lapservo/core/statistics.h"
 #include "lapservo/rig/registration_text.h"
@@ -27,53 +22,67 @@ constexpr int least_missed = 5;       // frames that contradict the rig's RCM be
 constexpr double grey_range = 12;     // of 255: largest minus smallest channel, sensor noise included
 constexpr double pixel_share = 0.99;  // of a frame's pixels that are grey
 
-double share_below(const cv::Mat& values, double level) {
-  return static_cast<double>(cv::countNonZero(values <= level)) / static_cast<double>(values.total());
-}
-
-// Largest and smallest channel of each pixel.
-std::pair<cv::Mat, cv::Mat> extremes(const cv::Mat& bgr) {
+bool is_grey(const cv::Mat& bgr) {
   std::vector<cv::Mat> channels;
   cv::split(bgr, channels);
   const cv::Mat largest = cv::max(cv::max(channels[0], channels[1]), channels[2]);
   const cv::Mat smallest = cv::min(cv::min(channels[0], channels[1]), channels[2]);
-  return {largest, smallest};
-}
-
-bool is_grey(const cv::Mat& bgr) {
-  const auto [largest, smallest] = extremes(bgr);
-  return share_below(largest - smallest, grey_range) >= pixel_share;
-}
-
-// Whether the tracker refused the frame.
-bool is_damaged(const std::vector<Observation>& observations) {
-  return std::any_of(observations.begin(), observations.end(),
-                     [](const Observation& observation) { return observation.status == Status::damaged; });
+  const int grey = cv::countNonZero(largest - smallest <= grey_range);
+  return static_cast<double>(grey) / static_cast<double>(bgr.total()) >= pixel_share;
 }
 
 }  // namespace
 
-FrameDiagnosis::FrameDiagnosis(const Rig& rig, bool deinterlaced) : rig_(rig), deinterlaced_(deinterlaced) {}
+const char* usual_cause(Status status) {
+  switch (status) {
+    case Status::ok:
+      return "";
+    case Status::no_marker:
+      return "the rig's hues_deg are not seen in their order: the marker is out of view, or its hues are others; "
+             "lapservo calibrate colour measures them";
+    case Status::cut:
+      return "the marker is cut by the image's border; move the endoscope or the instrument";
+    case Status::occluded:
+      return "blood, smoke, reflections or another instrument hide boundaries; clean the marker, move what covers it";
+    case Status::ambiguous:
+      return "two explanations fit: large parts are hidden or blurred, or two markers are alike; clean the marker, "
+             "focus, use other orders of hues";
+    case Status::poor_fit:
+      return "what has the marker's hues is not as the rig says; compare diameter_m and bands with the print, and the "
+             "focal length with the camera's";
+    case Status::uncertain:
+      return "the marker is too small, too dark, blurred or compressed for psi; come nearer, more light, a shorter "
+             "exposure, less compression, and where the rig's sigma_camera_matrix or sigma_response is large, lapservo "
+             "calibrate camera";
+    case Status::marker_mismatch:
+      return "the print is not as the rig says; lapservo calibrate marker measures it from a slow turn";
+    case Status::damaged:
+      return "the decoder reports damaged frames; repair what carries them, or record them again";
+    case Status::interlaced:
+      return "the frames are interlaced; --deinterlace tracks one field of each";
+    case Status::blended:
+      return "frames are the sum of two moments; switch off the recorder's noise reduction over time (3D NR, temporal "
+             "denoise) and every conversion of the frame rate";
+  }
+  return "";
+}
 
 void FrameDiagnosis::add(const cv::Mat& bgr, const std::vector<Observation>& observations) {
   ++frames_;
-  if (is_damaged(observations)) {
+  const auto any = [&](Status status) { return std::ranges::count(observations, status, &Observation::status) > 0; };
+  if (any(Status::damaged)) {
     for (const Observation& observation : observations) ++seen_[observation.instrument].refused[observation.status];
-    ++without_instrument_;
-    ++damaged_;
+    ++without_instrument_, ++damaged_;
     return;
   }
-  bool any_ok = false, any_result = false, interlaced = false, blended = false;
+  bool any_result = false;
   for (std::size_t i = 0; i < observations.size(); ++i) {
     const Observation& observation = observations[i];
     Seen& seen = seen_[observation.instrument];
-    interlaced |= observation.status == Status::interlaced;
-    blended |= observation.status == Status::blended;
     if (observation.status != Status::ok) {
       ++seen.refused[observation.status];
       continue;
     }
-    any_ok = true;
     ++seen.ok;
     seen.with_q += observation.rcm ? 1 : 0;
     const auto& camera_from_rcm = rig_.instruments[i].camera_from_rcm;
@@ -83,9 +92,9 @@ void FrameDiagnosis::add(const cv::Mat& bgr, const std::vector<Observation>& obs
     seen.misses_m.push_back(pose.miss_m(camera_from_rcm->translation));
     seen.reversed += pose.beyond_m(camera_from_rcm->translation) < 0 ? 1 : 0;
   }
-  interlaced_ += interlaced ? 1 : 0;
-  blended_ += blended ? 1 : 0;
-  without_instrument_ += any_ok ? 0 : 1;
+  interlaced_ += any(Status::interlaced) ? 1 : 0;
+  blended_ += any(Status::blended) ? 1 : 0;
+  without_instrument_ += any(Status::ok) ? 0 : 1;
   if (!any_result) keep(bgr);
 }
 
@@ -103,18 +112,14 @@ std::string FrameDiagnosis::text(bool lossy) const {
   return shown.empty() ? text_of_refusals(lossy) : shown;
 }
 
-std::optional<FrameDiagnosis::Refusal> FrameDiagnosis::most_frequent() const {
-  std::optional<Refusal> most;
-  for (const auto& [name, seen] : seen_)
-    for (const auto& [status, count] : seen.refused)
-      if (!most || count > most->frames) most = Refusal{name, status, count};
-  return most;
-}
-
 std::string FrameDiagnosis::text_of_refusals(bool lossy) const {
-  const auto most = most_frequent();
-  if (!most) return "";
-  const auto& [name, status, count] = *most;
+  std::string name;
+  Status status = Status::ok;
+  int count = 0;
+  for (const auto& [instrument, seen] : seen_)
+    for (const auto& [refusal, frames] : seen.refused)
+      if (frames > count) name = instrument, status = refusal, count = frames;
+  if (count == 0) return "";
   if (lossy && comes_by_compression(status))
     return fmt::format(
         "{}: {} of {} frames are {}, and the recording is compressed: record without losses or at a higher bit rate",
@@ -137,14 +142,14 @@ std::string FrameDiagnosis::cause_in_frames(bool found_nowhere) const {
   // Most frames of a blended recording are refused for what the blending does to them.
   if (blended_ > 0) return fmt::format("{} of {} {}", blended_, frames_, usual_cause(Status::blended));
   std::vector<PictureLight> lights;
-  std::transform(kept_.begin(), kept_.end(), std::back_inserter(lights), light_of_picture);
-  if (std::all_of(lights.begin(), lights.end(), std::mem_fn(&PictureLight::dark))) return dark_pictures;
-  if (std::all_of(kept_.begin(), kept_.end(), is_grey))
+  std::ranges::transform(kept_, std::back_inserter(lights), light_of_picture);
+  if (std::ranges::all_of(lights, &PictureLight::dark)) return dark_pictures;
+  if (std::ranges::all_of(kept_, is_grey))
     return "the frames are grey, and the marker is found by its colours: see whether the camera or its driver sends "
            "mono";
   if (found_nowhere)
     if (std::string found = found_otherwise(kept_, rig_, deinterlaced_); !found.empty()) return found;
-  if (std::all_of(lights.begin(), lights.end(), std::mem_fn(&PictureLight::overexposed)))
+  if (std::ranges::all_of(lights, &PictureLight::overexposed))
     return "the frames are overexposed, and their hues with them: lower the exposure, the gain or the light";
   return found_nowhere ? seen_other_bands(kept_, rig_, deinterlaced_) : "";
 }

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <map>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -9,8 +8,18 @@
 
 #include "lapservo/rig/rig.h"
 #include "lapservo/vision/observation.h"
+#include "lapservo/vision/status.h"
 
 namespace lapservo::internal {
+
+/// Why frames have this status, other than ok, and what helps, as docs/statuses.md has it: "CAUSE; REMEDY" without a
+/// full stop.
+const char* usual_cause(Status status);
+
+/// Whether compression refuses frames by this status.
+constexpr bool comes_by_compression(Status status) {
+  return status == Status::poor_fit || status == Status::uncertain || status == Status::ambiguous;
+}
 
 /// Why frames of a recording are damaged, show no instrument of a rig, or an instrument that misses the rig's RCM.
 /// Frames are added as they are tracked; a few of those without a result are kept and tried again in other readings
@@ -18,7 +27,7 @@ namespace lapservo::internal {
 class FrameDiagnosis {
  public:
   /// `deinterlaced`: one field of each frame is tracked.
-  explicit FrameDiagnosis(const Rig& rig, bool deinterlaced = false);
+  explicit FrameDiagnosis(const Rig& rig, bool deinterlaced = false) : rig_(rig), deinterlaced_(deinterlaced) {}
 
   /// A frame, 8-bit BGR of the rig's size, and what the tracker returns for it; nothing where no instrument is found.
   void add(const cv::Mat& bgr, const std::vector<Observation>& observations);
@@ -38,13 +47,7 @@ class FrameDiagnosis {
     std::vector<double> misses_m;  ///< distances of the shaft's axis from the rig's RCM, where q is missing
     int reversed = 0;              ///< of them, those whose marker points back to the RCM
   };
-  struct Refusal {
-    std::string instrument;
-    Status status;
-    int frames;
-  };
   void keep(const cv::Mat& bgr);
-  std::optional<Refusal> most_frequent() const;
   std::string cause_in_frames(bool found_nowhere) const;
   std::string text_of_refusals(bool lossy) const;
   std::string text_of_missed_rcm() const;

@@ -16,4 +16,8 @@ std::string found_otherwise(const std::vector<cv::Mat>& frames, const Rig& rig, 
 /// Whether most of these frames show q when they are turned by 180 degrees.
 bool shows_q_when_turned(const std::vector<cv::Mat>& frames, const Rig& rig, bool deinterlaced);
 
+/// Where most of these frames, 8-bit BGR, show an instrument's colours in their order but with bands that its marker
+/// has at no azimuth: one line with the lengths that are seen. Else empty.
+std::string seen_other_bands(const std::vector<cv::Mat>& frames, const Rig& rig, bool deinterlaced);
+
 }  // namespace lapservo::internal

@@ -2,12 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <map>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "lapservo/calibration/check/usual_cause.h"
+#include "lapservo/calibration/check/frame_diagnosis.h"
 #include "lapservo/calibration/registration/arm_start.h"
 #include "lapservo/calibration/registration/axes_meeting_point.h"
 #include "lapservo/calibration/registration/registration.h"
@@ -45,8 +46,7 @@ double median_over(const std::vector<FrameEvidence>& frames, Value value) {
 }
 
 std::optional<MarkerLight> typical_light(const std::vector<FrameEvidence>& frames) {
-  if (std::none_of(frames.begin(), frames.end(), [](const FrameEvidence& frame) { return frame.light.has_value(); }))
-    return std::nullopt;
+  if (std::ranges::none_of(frames, [](const FrameEvidence& f) { return f.light.has_value(); })) return std::nullopt;
   MarkerLight light;
   light.clipped = median_over(frames, [](const FrameEvidence& f) { return f.light->clipped; });
   light.value = median_over(frames, [](const FrameEvidence& f) { return f.light->value; });
@@ -63,8 +63,7 @@ class Advisor {
   std::vector<Advice> all() {
     light(), colours(), compression(), response(), camera(), print(), movement(), joints(), delay(), registration();
     view(), found();
-    std::stable_sort(advice_.begin(), advice_.end(),
-                     [](const Advice& a, const Advice& b) { return a.needed > b.needed; });
+    std::ranges::stable_sort(advice_, std::greater{}, &Advice::needed);
     return std::move(advice_);
   }
 
@@ -188,11 +187,10 @@ class Advisor {
                  axis_rad = rms(arm.at_best, &ArmResidual::axis_rad),
                  roll_rad = rms(arm.at_best, &ArmResidual::roll_rad);
     add(place_m > rig_limits.place_m || axis_rad > rig_limits.axis_rad || roll_rad > rig_limits.roll_rad,
-        fmt::format(
-            "joints and images disagree by {:.0f} times the images' noise after any calibration ({:.1f} mm, {:.0f} "
-            "mrad of the axis, {:.0f} mrad about it): {}",
-            arm.noise, 1e3 * place_m, 1e3 * axis_rad, 1e3 * roll_rad,
-            arm.fault.empty() ? "no one fault of the joints' readings explains it" : arm.fault),
+        fmt::format("joints and images disagree by {:.0f} times the images' noise after any calibration ({:.1f} mm, "
+                    "{:.0f} mrad of the axis, {:.0f} mrad about it): {}",
+                    arm.noise, 1e3 * place_m, 1e3 * axis_rad, 1e3 * roll_rad,
+                    arm.fault.empty() ? "no one fault of the joints' readings explains it" : arm.fault),
         "mend that; where it was the recording, record the marker and the joints again; then lapservo check",
         "the same in each pose that the joints give");
   }
@@ -227,10 +225,9 @@ class Advisor {
       const Eigen::Vector3d sigmas(arm.place_m->sigma, arm.axis_rad->sigma, arm.roll_rad->sigma);
       if (sigmas[0] > rig_limits.place_m || sigmas[1] > rig_limits.axis_rad || sigmas[2] > rig_limits.roll_rad)
         add(true,
-            fmt::format(
-                "this recording does not show whether the registration is right: it places the marker to {:.1f} "
-                "mm, {:.0f} mrad (axis), {:.0f} mrad (about it), one sigma: {}",
-                1e3 * sigmas[0], 1e3 * sigmas[1], 1e3 * sigmas[2], arm.fault.empty() ? swing_more : arm.fault),
+            fmt::format("this recording does not show whether the registration is right: it places the marker to "
+                        "{:.1f} mm, {:.0f} mrad (axis), {:.0f} mrad (about it), one sigma: {}",
+                        1e3 * sigmas[0], 1e3 * sigmas[1], 1e3 * sigmas[2], arm.fault.empty() ? swing_more : arm.fault),
             "record the marker and the joints again; then lapservo check", "whether the registration is right");
       const bool placed = !arm.place_m->exceeds(rig_limits.place_m) && !arm.axis_rad->exceeds(rig_limits.axis_rad);
       if (!placed || arm.roll_rad->exceeds(rig_limits.roll_rad))
@@ -262,7 +259,7 @@ class Advisor {
 
   // Without any reason above.
   void found() {
-    if (seldom_found() && std::none_of(advice_.begin(), advice_.end(), [](const Advice& a) { return a.needed; }))
+    if (seldom_found() && std::ranges::none_of(advice_, &Advice::needed))
       add(true, found_text(), "lapservo track --overlay, to see what hides it", "a loop that does not hold");
   }
 
@@ -326,9 +323,7 @@ RigFindings findings_of(const Rig& rig, std::size_t instrument, const RigEvidenc
   for (const FrameEvidence& frame : frames)
     if (frame.status != Status::ok) ++failures[frame.status];
   if (!failures.empty())
-    findings.failure = std::max_element(failures.begin(), failures.end(), [](const auto& a, const auto& b) {
-                         return a.second < b.second;
-                       })->first;
+    findings.failure = std::ranges::max_element(failures, {}, [](const auto& one) { return one.second; })->first;
   findings.picture = evidence.picture();
   findings.light = typical_light(frames);
   findings.width_px = median_over(frames, [](const FrameEvidence& f) { return f.width_px; });

@@ -1,8 +1,6 @@
 #include "lapservo/calibration/check/rig_evidence.h"
 
 #include <algorithm>
-#include <future>
-#include <optional>
 #include <utility>
 
 #include "lapservo/core/statistics.h"
@@ -57,9 +55,8 @@ void RigEvidence::look_at_light(const cv::Mat& bgr, const Observation& seen, Fre
   constexpr std::size_t every = 3;
   const ShaftPose pose{seen.camera_from_unrolled, seen.psi_rad};
   if ((frames_.size() + unfinished_.size()) % every == 0) response_.add(bgr, marker, pose);
-  const auto samples = band_samples(bgr, rig_.camera, marker, pose);
-  if (samples.empty()) return;
-  sight.light = light_of(samples, marker);
+  sight.light = light_of_marker(bgr, rig_.camera, marker, pose);
+  if (!sight.light) return;
   sight.width_px = marker.diameter_m * rig_.camera.fx_px / seen.camera_from_unrolled.translation.z();
 }
 
@@ -82,13 +79,6 @@ bool RigEvidence::look_with(FreeTrackers& trackers, const cv::Mat& bgr, double t
   return true;
 }
 
-FrameEvidence RigEvidence::tracked_as_it_is(const cv::Mat& bgr, double time_s) {
-  const Observation& seen = as_it_is_.track(bgr)[instrument_];
-  FrameEvidence frame{time_s, seen.status, seen.marker ? seen.marker->sigma_roll_rad : 0, seen.marker, {}, {}, 0};
-  if (seen.status == Status::ok && seen.rcm) frame.psi_rad = seen.rcm->q.psi_rad;
-  return frame;
-}
-
 bool RigEvidence::add(const cv::Mat& bgr, double time_s) {
   // The worker's half and this one share nothing, so that both at once find what one after the other would. Some frames
   // apart, as now the one and then the other takes longer.
@@ -96,7 +86,10 @@ bool RigEvidence::add(const cv::Mat& bgr, double time_s) {
   finish_all_but(most_unfinished - 1);
   auto as_it_is = worker_.run([this, bgr, time_s](std::size_t) {
     key_frames_.add(bgr, time_s);
-    return tracked_as_it_is(bgr, time_s);
+    const Observation& seen = as_it_is_.track(bgr)[instrument_];
+    FrameEvidence frame{time_s, seen.status, seen.marker ? seen.marker->sigma_roll_rad : 0, seen.marker, {}, {}, 0};
+    if (seen.status == Status::ok && seen.rcm) frame.psi_rad = seen.rcm->q.psi_rad;
+    return frame;
   });
   pictures_.push_back(light_of_picture(bgr));
   FreeSight free;
@@ -115,26 +108,6 @@ void RigEvidence::finish_all_but(std::size_t unfinished) const {
   }
 }
 
-const std::vector<FrameEvidence>& RigEvidence::frames() const {
-  finish_all_but(0);
-  return frames_;
-}
-
-const std::vector<TimedPose>& RigEvidence::poses() const {
-  finish_all_but(0);
-  return poses_;
-}
-
-std::optional<MarkerResponse::Result> RigEvidence::response() const {
-  finish_all_but(0);
-  return response_.result();
-}
-
-std::vector<KeyFrame> RigEvidence::take_key_frames() {
-  finish_all_but(0);
-  return key_frames_.take();
-}
-
 std::vector<TrackedPsi> RigEvidence::tracked_psi() const {
   std::vector<TrackedPsi> tracked;
   for (const FrameEvidence& frame : frames())
@@ -151,8 +124,7 @@ PictureLight RigEvidence::picture() const {
 }
 
 int RigEvidence::count(Status status) const {
-  return static_cast<int>(std::count_if(frames().begin(), frames().end(),
-                                        [&](const FrameEvidence& frame) { return frame.status == status; }));
+  return static_cast<int>(std::ranges::count(frames(), status, &FrameEvidence::status));
 }
 
 }  // namespace lapservo::internal

@@ -9,10 +9,9 @@
 #include <opencv2/core.hpp>
 
 #include "lapservo/calibration/check/arm_check.h"
-#include "lapservo/calibration/colour/band_samples.h"
+#include "lapservo/calibration/colour/light.h"
 #include "lapservo/calibration/colour/marker_response.h"
 #include "lapservo/calibration/marker/marker_calibration.h"
-#include "lapservo/calibration/recording/picture_light.h"
 #include "lapservo/calibration/registration/timed_pose.h"
 #include "lapservo/core/workers.h"
 #include "lapservo/rig/rig.h"
@@ -43,16 +42,16 @@ class RigEvidence {
   bool add(const cv::Mat& bgr, double time_s);
 
   // These functions wait for all frames that were added.
-  const std::vector<FrameEvidence>& frames() const;
+  const std::vector<FrameEvidence>& frames() const { return finish_all_but(0), frames_; }
   /// By the image alone, whatever the print; with TimedPose::by_focal.
-  const std::vector<TimedPose>& poses() const;
+  const std::vector<TimedPose>& poses() const { return finish_all_but(0), poses_; }
   std::vector<TrackedPsi> tracked_psi() const;
   /// Nullopt when the marker's edges are too few.
-  std::optional<MarkerResponse::Result> response() const;
+  std::optional<MarkerResponse::Result> response() const { return finish_all_but(0), response_.result(); }
   PictureLight picture() const;  ///< medians
   int count(Status status) const;
   /// Empties what it takes.
-  std::vector<KeyFrame> take_key_frames();
+  std::vector<KeyFrame> take_key_frames() { return finish_all_but(0), key_frames_.take(); }
 
  private:
   static constexpr double focal_step = 0.01;
@@ -74,7 +73,6 @@ class RigEvidence {
   // Whether the marker was found.
   bool look_with(FreeTrackers& trackers, const cv::Mat& bgr, double time_s, FreeSight& sight);
   void look_at_light(const cv::Mat& bgr, const Observation& seen, FreeSight& sight);
-  FrameEvidence tracked_as_it_is(const cv::Mat& bgr, double time_s);
   void finish_all_but(std::size_t unfinished) const;
 
   Rig rig_;

@@ -1,9 +1,7 @@
 #include "lapservo/calibration/check/work_space.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstddef>
 #include <limits>
 
 #include "lapservo/core/angles.h"
@@ -21,14 +19,14 @@ namespace {
 // The one instrument, each frame on its own.
 class Judge {
  public:
-  Judge(const Rig& rig, std::size_t instrument) : rig_(only(rig, instrument)), tracker_(rig_, {.single = true}) {
-    const Camera& camera = rig_.camera;
-    renderer_.emplace(camera, shafts_of(rig_), make_tissue(camera.width_px, camera.height_px, 1));
-  }
+  Judge(const Rig& rig, std::size_t instrument)
+      : rig_(only(rig, instrument)),
+        tracker_(rig_, {.single = true}),
+        renderer_(rig_.camera, shafts_of(rig_), make_tissue(rig_.camera.width_px, rig_.camera.height_px, 1)) {}
 
   // Nullopt where it is not found.
   std::optional<double> sigma_rad(const Rigid3& camera_from_unrolled, double psi_rad) {
-    const cv::Mat picture = renderer_->render({{camera_from_unrolled, psi_rad}}, ++seed_);
+    const cv::Mat picture = renderer_.render({{camera_from_unrolled, psi_rad}}, ++seed_);
     const Observation& seen = tracker_.track(picture)[0];
     if (seen.status != Status::ok || !seen.marker) return std::nullopt;
     return seen.marker->sigma_roll_rad;
@@ -44,7 +42,7 @@ class Judge {
 
   Rig rig_;
   Tracker tracker_;
-  std::optional<Renderer> renderer_;
+  Renderer renderer_;
   std::uint64_t seed_ = 0;
 };
 

@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
 
-#include "lapservo/calibration/colour/band_samples.h"
+#include "lapservo/calibration/colour/light.h"
 #include "lapservo/calibration/colour/marker_response.h"
 #include "lapservo/calibration/fit/robust_scale.h"
 #include "lapservo/core/angles.h"
@@ -120,8 +120,7 @@ struct HueFaults {
 // the time as at other times, rms, so that its sigma counts the motion.
 HueFaults hue_faults(const std::vector<FrameHues>& frames, const std::array<double, 3>& middle_deg) {
   const auto rows = 3 * static_cast<Eigen::Index>(frames.size());
-  const auto [darkest, brightest] = std::minmax_element(
-      frames.begin(), frames.end(), [](const FrameHues& a, const FrameHues& b) { return a.value < b.value; });
+  const auto [darkest, brightest] = std::ranges::minmax_element(frames, {}, &FrameHues::value);
   LinearFit fit;
   fit.alike_groups = frames_alike, fit.residuals.resize(rows);
   Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(rows, 3), slopes = Eigen::MatrixXd::Zero(rows, 6);
@@ -154,8 +153,7 @@ HueFaults hue_faults(const std::vector<FrameHues>& frames, const std::array<doub
   if (most_deg[1] > least_fault_deg)
     result.texts.push_back(
         fmt::format("the hues change by {:.1f} degrees from the darkest frame to the brightest: fix the exposure, "
-                    "switch other lights "
-                    "off",
+                    "switch other lights off",
                     most_deg[1]));
   return result;
 }
@@ -185,11 +183,10 @@ MeasuredHues measure(const Rig& rig, std::size_t instrument, const std::vector<c
     places.push_back(pose.camera_from_unrolled.translation);
     turn += Eigen::Vector2d(std::cos(seen.tau_rad), std::sin(seen.tau_rad));
     if (response) response->add(frame, marker, pose);
-    const auto samples = band_samples(frame, rig.camera, marker, pose);
-    if (samples.empty()) continue;
-    const MarkerLight light = light_of(samples, marker);
-    clipped.push_back(light.clipped);
-    auto& beyond_deg = hues.emplace_back(FrameHues{light.hues_deg, light.value}).beyond_deg;
+    const auto light = light_of_marker(frame, rig.camera, marker, pose);
+    if (!light) continue;
+    clipped.push_back(light->clipped);
+    auto& beyond_deg = hues.emplace_back(FrameHues{light->hues_deg, light->value}).beyond_deg;
     for (std::size_t band = 0; band < 3; ++band) beyond_deg[band] -= marker.hues_deg[band];
   }
   measured.hues_deg = marker.hues_deg;
@@ -224,13 +221,13 @@ std::string refusal_of(const MeasuredHues& measured, std::size_t frames, const s
   const auto& hues = measured.hues_deg;
   if (2 * static_cast<std::size_t>(measured.found) < frames)
     return fmt::format(
-        "with the hues that suit best {} is in {} of {} frames: show it wholly, near, lit and in motion; "
-        "the rig's hues_deg may be 60 degrees off, its diameter_m and bands half a millimetre",
+        "with the hues that suit best {} is in {} of {} frames: show it wholly, near, lit and in motion; the rig's "
+        "hues_deg may be 60 degrees off, its diameter_m and bands half a millimetre",
         name, measured.found, frames);
   if (measured.clipped > max_clipped)
     return fmt::format(
-        "{:.0f} % of the marker's pixels are saturated, which have the sensor's hue and not the ink's: "
-        "lower the exposure",
+        "{:.0f} % of the marker's pixels are saturated, which have the sensor's hue and not the ink's: lower the "
+        "exposure",
         100 * measured.clipped);
   if (measured.moved_m < least_move_m && measured.turned_rad < least_turn_rad)
     return "the frames are all alike: move the instrument through the image and turn it, 10 s or more";
@@ -238,8 +235,8 @@ std::string refusal_of(const MeasuredHues& measured, std::size_t frames, const s
       std::min({hue_gap_deg(hues[0], hues[1]), hue_gap_deg(hues[1], hues[2]), hue_gap_deg(hues[0], hues[2])});
   if (apart_deg < least_apart_deg)
     return fmt::format(
-        "two bands' hues are {:.0f} degrees apart, at least {:.0f} are needed: print with other inks, or "
-        "look at the white balance",
+        "two bands' hues are {:.0f} degrees apart, at least {:.0f} are needed: print with other inks, or look at the "
+        "white balance",
         apart_deg, least_apart_deg);
   if (*std::max_element(measured.sigma_deg.begin(), measured.sigma_deg.end()) > max_sigma_deg)
     return "the hues are not those of one light: " +
@@ -305,8 +302,7 @@ ColourCalibration calibrate_colour(const Rig& rig, std::size_t instrument, const
     if (std::abs(result->left_px) > std::max(least_px, seen_sigmas * result->sigma_left_px))
       calibration.response_found += fmt::format(
           "; no usual one explains the edges, {:.3f} px are left beyond their noise: switch the camera's sharpening "
-          "off, "
-          "or lapservo calibrate camera",
+          "off, or lapservo calibrate camera",
           std::abs(result->left_px));
   } else {
     calibration.response_found = "as it is: too few edges; come nearer";

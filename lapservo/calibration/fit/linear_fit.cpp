@@ -1,6 +1,6 @@
 #include "lapservo/calibration/fit/linear_fit.h"
 
-#include <cstddef>
+#include <iterator>
 
 namespace lapservo::internal {
 
@@ -25,13 +25,8 @@ LinearFit linear_fit(ceres::Problem& problem, const FittedNumbers& numbers) {
   LinearFit fit;
   fit.noise = 1;
   fit.residuals = Eigen::Map<const Eigen::VectorXd>(residuals.data(), static_cast<Eigen::Index>(residuals.size()));
-  std::vector<Eigen::Triplet<double>> entries;
-  for (int row = 0; row < rows.num_rows; ++row)
-    for (auto k = static_cast<std::size_t>(rows.rows[static_cast<std::size_t>(row)]);
-         k < static_cast<std::size_t>(rows.rows[static_cast<std::size_t>(row) + 1]); ++k)
-      entries.emplace_back(row, rows.cols[k], rows.values[k]);
-  fit.jacobian.resize(rows.num_rows, rows.num_cols);
-  fit.jacobian.setFromTriplets(entries.begin(), entries.end());
+  fit.jacobian = Eigen::Map<const Eigen::SparseMatrix<double, Eigen::RowMajor>>(
+      rows.num_rows, rows.num_cols, std::ssize(rows.values), rows.rows.data(), rows.cols.data(), rows.values.data());
   return fit;
 }
 

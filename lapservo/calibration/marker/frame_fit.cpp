@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <ceres/ceres.h>
 #include <cmath>
-#include <memory>
-#include <vector>
 
 #include "lapservo/calibration/fit/robust_scale.h"
 #include "lapservo/calibration/fit/solve_quietly.h"

@@ -3,15 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <set>
 #include <utility>
+
+#include <fmt/format.h>
 
 #include "lapservo/calibration/marker/print_adjustment.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/core/statistics.h"
-#include "lapservo/geometry/cylinder.h"
-#include "lapservo/marker/azimuths.h"
 #include "lapservo/marker/decoder.h"
 #include "lapservo/vision/edges/edge_measurements.h"
 #include "lapservo/vision/image/light_image.h"
@@ -41,10 +40,6 @@ struct Round {
 };
 constexpr std::array rounds{Round{0.6e-3, 2.0e-3, 60}, Round{0.4e-3, 1.2e-3, 20}, Round{0.2e-3, 0.6e-3, 6, true},
                             Round{0.1e-3, 0.4e-3, 2.5, true}};
-
-std::size_t sector_of(double tau_rad) {
-  return static_cast<std::size_t>(std::min(sectors - 1.0, wrap_two_pi(tau_rad) / two_pi * sectors));
-}
 
 // The marker's other azimuths face the camera as it turns; farther than so from one frame to the next it jumped.
 double turn_between(double before_tau_rad, double tau_rad) {
@@ -77,7 +72,9 @@ class TurnFit {
         marker_(rig.instruments[instrument].marker),
         frames_(std::move(frames)),
         at_iteration_(at_iteration) {
-    for (KeyFrame& frame : frames_) settle(frame);
+    // Where it does not settle, a coarse pose is good enough to start from: the rounds look far.
+    for (auto& [view, sighting, time_s, turned_rad] : frames_)
+      if (!sighting.settled) sighting = measurer_.settled(view, marker_, sighting).value_or(sighting);
   }
 
   const Marker& marker() const { return marker_; }
@@ -85,7 +82,6 @@ class TurnFit {
   std::vector<KeyFrame> take_frames() { return std::move(frames_); }
   const std::vector<ViewMeasurements>& measured() const { return measured_; }
   void believe_no_gap() { marker_.gap_rad = 0, free_gap_ = false; }
-  bool free_gap() const { return free_gap_; }
 
   // Measures and adjusts once. Nullopt when it can't be solved.
   std::optional<Adjustment> round(const Round& how, bool free_print, bool with_covariance = false) {
@@ -105,8 +101,7 @@ class TurnFit {
     if (frames_.empty()) return std::nullopt;
     take_processing_off(measured_);
     auto adjustment =
-        adjust(measured_, marker_, {how.loss_scale_sigmas, free_print, free_gap_ && free_print, with_covariance},
-               at_iteration_);
+        adjust(measured_, marker_, {how.loss_scale_sigmas, free_print, free_gap_, with_covariance}, at_iteration_);
     if (!adjustment) return std::nullopt;
     for (std::size_t i = 0; i < frames_.size(); ++i) {
       Sighting& sighting = frames_[i].sighting;
@@ -140,27 +135,19 @@ class TurnFit {
 
   // Forgets frames whose boundaries agree much worse than others' do: a wrong pose, something in front.
   void drop_misfits(const Adjustment& adjustment) {
-    std::vector<double> scatters;
-    for (std::size_t i = 0; i < frames_.size(); ++i) scatters.push_back(scatter(adjustment, i));
+    std::vector<double> scatters;  // medians of the frames' residuals, in sigmas
+    for (std::size_t i = 0; i < frames_.size(); ++i) {
+      std::vector<double> sigmas;
+      for (std::size_t k = 0; k < adjustment.residuals_px[i].size(); ++k)
+        sigmas.push_back(std::abs(adjustment.residuals_px[i][k]) / measured_[i].edges.all[k].sigma_px);
+      scatters.push_back(median(sigmas));
+    }
     const double limit = 3 * median(std::vector(scatters)) + 0.5;
     std::size_t i = 0;
     std::erase_if(frames_, [&](const KeyFrame&) { return !(scatters[i++] < limit); });
   }
 
  private:
-  // Where it can't be, a coarse pose is good enough to start from: the rounds look far.
-  void settle(KeyFrame& frame) const {
-    if (frame.sighting.settled) return;
-    if (const auto settled = measurer_.settled(frame.view, marker_, frame.sighting)) frame.sighting = *settled;
-  }
-  // Median of a frame's residuals, in sigmas.
-  double scatter(const Adjustment& adjustment, std::size_t frame) const {
-    std::vector<double> sigmas;
-    for (std::size_t i = 0; i < adjustment.residuals_px[frame].size(); ++i)
-      sigmas.push_back(std::abs(adjustment.residuals_px[frame][i]) / measured_[frame].edges.all[i].sigma_px);
-    return median(sigmas);
-  }
-
   ViewMeasurer measurer_;
   Marker marker_;
   std::vector<KeyFrame> frames_;
@@ -172,11 +159,8 @@ class TurnFit {
 // The widest stretch of azimuths from which no frame faces the marker.
 double widest_unseen(const std::vector<KeyFrame>& frames, const Marker& marker) {
   std::vector<double> taus_rad;
-  for (const KeyFrame& frame : frames) {
-    const ShaftPose& pose = frame.sighting.unknowns.pose();
-    if (const auto view = view_cylinder(pose.camera_from_unrolled, marker.radius_m()))
-      taus_rad.push_back(wrap_two_pi(marker_azimuth_rad(marker, view->facing_azimuth_rad, pose.psi_rad)));
-  }
+  for (const KeyFrame& frame : frames)
+    if (const auto tau_rad = facing_tau_rad(marker, frame.sighting.unknowns.pose())) taus_rad.push_back(*tau_rad);
   if (taus_rad.empty()) return two_pi;
   std::sort(taus_rad.begin(), taus_rad.end());
   double widest = two_pi - taus_rad.back() + taus_rad.front();
@@ -185,9 +169,8 @@ double widest_unseen(const std::vector<KeyFrame>& frames, const Marker& marker) 
 }
 
 std::size_t seam_views(const std::vector<ViewMeasurements>& measured) {
-  return static_cast<std::size_t>(std::count_if(measured.begin(), measured.end(), [](const ViewMeasurements& m) {
-    return m.seam && (m.seam->upper || m.seam->lower);
-  }));
+  return static_cast<std::size_t>(std::ranges::count_if(
+      measured, [](const ViewMeasurements& m) { return m.seam && (m.seam->upper || m.seam->lower); }));
 }
 
 // Whether most frames are too blurred; empty when they are not. Only the rounds show it for a frame that did not
@@ -200,35 +183,25 @@ std::string blur_refusal(const std::vector<KeyFrame>& frames, const Marker& mark
     return *std::min_element(along_px.begin(), along_px.end()) >
            max_blur_diameters * marker.diameter_m * frame.view.camera.fx_px / depth_m;
   });
-  if (2 * static_cast<std::size_t>(blurred) > frames.size()) {
-    char text[200];
-    std::snprintf(text, sizeof text,
-                  "%zd of %zu frames are too blurred (by more than %.0f %% of the shaft's width): focus, turn more "
-                  "slowly, or come nearer",
-                  static_cast<std::ptrdiff_t>(blurred), frames.size(), 100 * max_blur_diameters);
-    return text;
-  }
-  return {};
+  if (2 * static_cast<std::size_t>(blurred) <= frames.size()) return {};
+  return fmt::format(
+      "{} of {} frames are too blurred (by more than {:.0f} % of the shaft's width): focus, turn more slowly, or come "
+      "nearer",
+      blurred, frames.size(), 100 * max_blur_diameters);
 }
 
 // The reason why these frames do not determine the print; empty when they do.
 std::string refusal_of(const std::vector<KeyFrame>& frames, const Marker& marker) {
-  char text[240];
-  if (frames.size() < min_turn_frames) {
-    std::snprintf(text, sizeof text,
-                  "%zu frames show the marker wholly, from different sides, and at least %zu are needed: film a slow "
-                  "full turn about the shaft's axis, the whole marker in view",
-                  frames.size(), min_turn_frames);
-    return text;
-  }
-  const double unseen_rad = widest_unseen(frames, marker);
-  if (unseen_rad > widest_unseen_rad) {
-    std::snprintf(text, sizeof text,
-                  "the marker is not seen from all sides (%.0f of 360 degrees are missing): film a slow full turn "
-                  "about the shaft's axis",
-                  deg_from_rad(unseen_rad));
-    return text;
-  }
+  if (frames.size() < min_turn_frames)
+    return fmt::format(
+        "{} frames show the marker wholly, from different sides, and at least {} are needed: film a slow full turn "
+        "about the shaft's axis, the whole marker in view",
+        frames.size(), min_turn_frames);
+  if (const double unseen_rad = widest_unseen(frames, marker); unseen_rad > widest_unseen_rad)
+    return fmt::format(
+        "the marker is not seen from all sides ({:.0f} of 360 degrees are missing): film a slow full turn about the "
+        "shaft's axis",
+        deg_from_rad(unseen_rad));
   return blur_refusal(frames, marker);
 }
 
@@ -250,14 +223,13 @@ std::vector<std::string> texts_of(const std::vector<PrintFault>& faults, double 
   std::set<PrintFault::Kind> told;
   for (const PrintFault& fault : faults) {
     if (!told.insert(fault.kind).second) continue;
-    char text[200];
-    std::snprintf(text, sizeof text,
-                  fault.kind == PrintFault::Kind::slips
-                      ? "the print slips by %.3f mm about %.0f s after the start: fasten it and "
-                        "record again"
-                      : "a boundary of the print bows by %.3f mm between its ends: print and cut it straight",
-                  1e3 * std::abs(fault.size), fault.from_s - first_s);
-    texts.emplace_back(text);
+    const double size_mm = 1e3 * std::abs(fault.size);
+    texts.push_back(
+        fault.kind == PrintFault::Kind::slips
+            ? fmt::format("the print slips by {:.3f} mm about {:.0f} s after the start: fasten it and record again",
+                          size_mm, fault.from_s - first_s)
+            : fmt::format("a boundary of the print bows by {:.3f} mm between its ends: print and cut it straight",
+                          size_mm));
   }
   return texts;
 }
@@ -302,12 +274,11 @@ bool KeyFrames::add(const cv::Mat& bgr, double time_s) {
   ++found_;
   last_tau_rad_ = sighting->tau_rad;
   const double turned_rad = before_rad ? turn_between(*before_rad, sighting->tau_rad) : 0;
-  auto& sector = sectors_[sector_of(sighting->tau_rad) + (turned_rad < 0 ? sectors : 0)];
+  const double at = std::min(sectors - 1.0, wrap_two_pi(sighting->tau_rad) / two_pi * sectors);
+  auto& sector = sectors_[static_cast<std::size_t>(at) + (turned_rad < 0 ? sectors : 0)];
   auto worst = sector.end();
   if (sector.size() >= max_per_sector) {
-    worst = std::min_element(sector.begin(), sector.end(), [](const KeyFrame& a, const KeyFrame& b) {
-      return worth(a.sighting) < worth(b.sighting);
-    });
+    worst = std::ranges::min_element(sector, {}, [](const KeyFrame& frame) { return worth(frame.sighting); });
     if (worth(worst->sighting) >= worth(*sighting)) return true;
   }
   const Marker& marker = rig_.instruments[instrument_].marker;
@@ -386,14 +357,12 @@ MarkerCalibration calibrate_marker(const Rig& rig, std::size_t instrument, std::
   calibration.marker.sigmas = sigmas_of(*last->covariance, nominal.sigmas);
   if (no_gap_sigma_rad) calibration.marker.sigmas.gap_rad = no_gap_sigma_rad;
   calibration.marker.tolerance_m = tolerance_of(PrintShape::of(fit.marker()), *last->covariance, fit.marker());
-  if (calibration.marker.tolerance_m > max_tolerance_m) {
-    char text[80];
-    std::snprintf(text, sizeof text,
-                  "its boundaries would be known to %.2f mm only: ", 1e3 * calibration.marker.tolerance_m);
+  if (calibration.marker.tolerance_m > max_tolerance_m)
     return refused(
-        text + (calibration.faults.empty() ? "turn it more slowly, nearer and sharper" : calibration.faults.front()),
+        fmt::format(
+            "its boundaries would be known to {:.2f} mm only: {}", 1e3 * calibration.marker.tolerance_m,
+            calibration.faults.empty() ? "turn it more slowly, nearer and sharper" : calibration.faults.front()),
         !calibration.faults.empty());
-  }
   if (const auto problem = marker_problem(calibration.marker))
     return refused("what was found is no marker: " + problem->text());
   if (const std::string problem = decoding_problem(calibration.marker); !problem.empty())

@@ -9,22 +9,10 @@
 #include "lapservo/core/error.h"
 
 namespace lapservo::internal {
-namespace {
-
-// Frames of a video lie close together: more of them add no information.
-constexpr int enough = 400;
-
-void add_seam(const Instrument& instrument, const JointsOfTurn& joints, MarkerCalibration& calibration) {
-  const SeamRegistration seam = register_seam(instrument, calibration, joints.recording);
-  if (!seam.refusal.empty()) throw InputError(joints.source, seam.refusal);
-  calibration.marker.seam_rad = seam.seam_rad;
-  calibration.marker.sigmas.seam_rad = seam.sigma_rad;
-}
-
-}  // namespace
 
 MarkerMeasurement measure_marker(const Rig& rig, std::size_t index, const FrameRecording& recording,
                                  const std::optional<JointsOfTurn>& joints, const JobWatch& watch) {
+  constexpr int enough = 400;  // frames of a video lie close together: more of them add no information
   const Instrument& instrument = rig.instruments[index];
   KeyFrames key_frames(rig, index);
   FrameDiagnosis diagnosis(rig);
@@ -51,7 +39,11 @@ MarkerMeasurement measure_marker(const Rig& rig, std::size_t index, const FrameR
   if (!measured.calibration.refusal.empty() && 2 * measured.found < measured.read.looked_at && !watch.stopped())
     measured.calibration.refusal += diagnosis.cause();
   if (measured.read.jpegs == measured.read.looked_at) measured.calibration.seam_may_lag = false;
-  if (joints && measured.calibration.refusal.empty()) add_seam(instrument, *joints, measured.calibration);
+  if (!joints || !measured.calibration.refusal.empty()) return measured;
+  const SeamRegistration seam = register_seam(instrument, measured.calibration, joints->recording);
+  if (!seam.refusal.empty()) throw InputError(joints->source, seam.refusal);
+  measured.calibration.marker.seam_rad = seam.seam_rad;
+  measured.calibration.marker.sigmas.seam_rad = seam.sigma_rad;
   return measured;
 }
 

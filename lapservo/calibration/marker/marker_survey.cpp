@@ -68,9 +68,6 @@ std::optional<Sighting> refined(const Scene& scene, const LightImage& light, con
 
 }  // namespace
 
-MarkerSurvey::MarkerSurvey(const Rig& rig, std::size_t instrument)
-    : rig_(rig), instrument_(instrument), classes_(rig.instruments), light_(rig.camera.response.table()) {}
-
 std::optional<Sighting> MarkerSurvey::follow(const Scene& scene, const LightImage& light) const {
   const CoarseFit coarse = fit_coarsely(scene, last_->unknowns, Rotation::known);
   if (!coarse.found) return std::nullopt;
@@ -173,9 +170,6 @@ bool shows_only_video(const std::vector<ViewMeasurements>& any, const std::vecto
          median(variances_px2) > min_chroma_variance_px2;
 }
 
-ViewMeasurer::ViewMeasurer(const Rig& rig, std::size_t instrument)
-    : classes_(rig.instruments), bands_(classes_.of_bands(instrument)), light_(rig.camera.response.table()) {}
-
 ViewMeasurements ViewMeasurer::measure(const MarkerView& view, const Marker& marker, const Sighting& sighting,
                                        const Reach& reach) const {
   constexpr int iterations = 6;
@@ -185,8 +179,11 @@ ViewMeasurements ViewMeasurer::measure(const MarkerView& view, const Marker& mar
   const LightImage& light = seen.light();
   const Scene scene{image, view.camera, classes_, marker, bands_};
   ViewMeasurements measured;
-  measured.edges = measure_edges(scene, light, sighting.unknowns, sighting.film_m,
-                                 {reach.extra_px, reach.extra_px, iterations, 1}, sighting.blur);
+  const auto edges_in = [&](const Scene& of, const LightImage& by) {
+    return measure_edges(of, by, sighting.unknowns, sighting.film_m, {reach.extra_px, reach.extra_px, iterations, 1},
+                         sighting.blur);
+  };
+  measured.edges = edges_in(scene, light);
   if (reach.ask_processing)
     measured.processing = find_processing(light, measured.edges.all, sighting.blur.boundaries_px(),
                                           reach.only_video ? expected_video : expected_picture);
@@ -201,9 +198,7 @@ ViewMeasurements ViewMeasurer::measure(const MarkerView& view, const Marker& mar
     const ImageView grey_image(grey);
     const LightImage grey_light(grey_image, light.light_of_value());
     const Scene grey_scene{grey_image, view.camera, classes_, marker, bands_};
-    take_sides(measure_edges(grey_scene, grey_light, sighting.unknowns, sighting.film_m,
-                             {reach.extra_px, reach.extra_px, iterations, 1}, sighting.blur),
-               measured.edges);
+    take_sides(edges_in(grey_scene, grey_light), measured.edges);
     measured.seam = seam_by(reach.only_video ? &grey_light : nullptr);
   } else {
     measured.seam = seam_by(nullptr);

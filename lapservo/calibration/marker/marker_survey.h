@@ -31,7 +31,8 @@ struct Sighting {
 /// at the seam): like SurfaceTracker, but whether the print is the rig's does not count.
 class MarkerSurvey {
  public:
-  MarkerSurvey(const Rig& rig, std::size_t instrument);
+  MarkerSurvey(const Rig& rig, std::size_t instrument)
+      : rig_(rig), instrument_(instrument), classes_(rig.instruments), light_(rig.camera.response.table()) {}
 
   /// 8-bit BGR of the rig's size. Starts from where the marker was in the frame before.
   std::optional<Sighting> find(const cv::Mat& bgr);
@@ -80,7 +81,8 @@ bool shows_only_video(const std::vector<ViewMeasurements>& any, const std::vecto
 /// Measures many views of one marker.
 class ViewMeasurer {
  public:
-  ViewMeasurer(const Rig& rig, std::size_t instrument);
+  ViewMeasurer(const Rig& rig, std::size_t instrument)
+      : classes_(rig.instruments), bands_(classes_.of_bands(instrument)), light_(rig.camera.response.table()) {}
 
   /// How far edges are looked for: beyond the blur, and the seam's around the shaft; whether there may be a gap;
   /// whether to find out what the camera did to the image.

@@ -49,8 +49,9 @@ struct SharedUnknowns {
   std::array<double, 4> boundaries_px{};
   double seam_lag_px = 0;  // by how much the seam's edges stay behind their motion
 
-  std::array<double*, print_numbers - 1> lengths_mm() {
-    return {&upper_mm[1], &upper_mm[2], &upper_mm[3], &lower_mm[0], &lower_mm[1], &lower_mm[2], &lower_mm[3]};
+  // As PrintNumbers, lengths in mm.
+  std::array<double*, print_numbers> print() {
+    return {&upper_mm[1], &upper_mm[2], &upper_mm[3], &lower_mm[0], &lower_mm[1], &lower_mm[2], &lower_mm[3], &gap_rad};
   }
   // Measured on rendered frames: sides up to 0.08 px, an end whose face is seen up to 0.1 px, inner boundaries 0.01 px.
   std::array<TakenForZero, 8> taken_for_zero() {
@@ -211,8 +212,8 @@ bool tells_lag(const std::vector<ViewMeasurements>& frames) {
 }
 
 void add_priors(ceres::Problem& problem, SharedUnknowns& shared, bool free_lag) {
-  for (double* length_mm : shared.lengths_mm()) add_prior(problem, length_mm, 0, print_prior_mm);
-  add_prior(problem, &shared.gap_rad, 0, gap_prior_rad);
+  for (double* number : shared.print())
+    add_prior(problem, number, 0, number == &shared.gap_rad ? gap_prior_rad : print_prior_mm);
   for (const TakenForZero& taken : shared.taken_for_zero()) add_prior(problem, taken.unknown, 0, zero * taken.sigma);
   add_prior(problem, &shared.seam_lag_px, 0, free_lag ? seam_lag_px : zero * seam_lag_px);
 }
@@ -286,9 +287,7 @@ PrintDepartures departures_at(ceres::Problem& problem, const std::vector<ViewMea
                               const std::vector<std::vector<EdgeCost>>& edges, double loss_scale_sigmas,
                               SharedUnknowns& shared, std::vector<FrameUnknowns>& unknowns) {
   FittedNumbers numbers(problem);
-  std::vector<double*> print;
-  for (double* length_mm : shared.lengths_mm()) print.push_back(length_mm);
-  print.push_back(&shared.gap_rad);
+  const auto print = shared.print();
   for (double* number : print) numbers.add(number);
   for (const TakenForZero& taken : shared.taken_for_zero()) numbers.add(taken.unknown);
   numbers.add(&shared.seam_lag_px);
@@ -300,8 +299,7 @@ PrintDepartures departures_at(ceres::Problem& problem, const std::vector<ViewMea
   fit.noise = 0, fit.unmodelled_sigmas = unmodelled_sigmas, fit.alike_groups = alike_frames;
   for (const auto& of_frame : edges) fit.groups.push_back(of_frame.front().row);
   fit.groups.push_back(edges.back().back().row + 1);
-  const auto [first, last] = std::minmax_element(frames.begin(), frames.end(),
-                                                 [](const auto& a, const auto& b) { return a.time_s < b.time_s; });
+  const auto [first, last] = std::ranges::minmax_element(frames, {}, &ViewMeasurements::time_s);
   const auto possible = possible_faults(first->time_s, last->time_s);
   Eigen::MatrixXd slopes = Eigen::MatrixXd::Zero(fit.residuals.size(), static_cast<Eigen::Index>(possible.size()));
   for (std::size_t i = 0; i < frames.size(); ++i)
@@ -328,9 +326,8 @@ PrintDepartures departures_at(ceres::Problem& problem, const std::vector<ViewMea
 std::optional<PrintCovariance> covariance_of(ceres::Problem& problem, SharedUnknowns& shared,
                                              const std::vector<TakenForZero>& errors, double noise_scale,
                                              const PrintCovariance& by_faults) {
-  const auto lengths_mm = shared.lengths_mm();
-  std::vector<const double*> unknowns(lengths_mm.begin(), lengths_mm.end());
-  unknowns.push_back(&shared.gap_rad);
+  const auto numbers = shared.print();
+  std::vector<const double*> unknowns(numbers.begin(), numbers.end());
   Eigen::VectorXd prior(static_cast<Eigen::Index>(errors.size()));
   for (std::size_t i = 0; i < errors.size(); ++i) {
     unknowns.push_back(errors[i].unknown);
@@ -370,9 +367,9 @@ std::optional<Adjustment> adjust(const std::vector<ViewMeasurements>& frames, co
   for (std::size_t i = 0; i < frames.size(); ++i)
     edges.push_back(
         add_frame(problem, frames[i], shape, marker.covered_rad(), options.loss_scale_sigmas, shared, unknowns[i]));
-  if (!options.free_print)
-    for (double* length_mm : shared.lengths_mm()) problem.SetParameterBlockConstant(length_mm);
-  if (!options.free_print || !options.free_gap) problem.SetParameterBlockConstant(&shared.gap_rad);
+  for (double* number : shared.print())
+    if (!options.free_print || (number == &shared.gap_rad && !options.free_gap))
+      problem.SetParameterBlockConstant(number);
 
   ceres::Solver::Options solver;
   solver.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
@@ -384,9 +381,8 @@ std::optional<Adjustment> adjust(const std::vector<ViewMeasurements>& frames, co
   Adjustment result;
   const double edges_px = sigma_of_edges_px(frames);
   result.lags = !free_lag && noise_beyond_usual(edges_px) > min_noise_of_lag;
-  const auto lengths_mm = shared.lengths_mm();
-  for (std::size_t i = 0; i < lengths_mm.size(); ++i) result.print[static_cast<Eigen::Index>(i)] = mm * *lengths_mm[i];
-  result.print[print_numbers - 1] = shared.gap_rad;
+  std::ranges::transform(shared.print(), result.print.begin(),
+                         [&](const double* number) { return number == &shared.gap_rad ? *number : mm * *number; });
   std::vector<double> sigmas;
   for (std::size_t i = 0; i < frames.size(); ++i) {
     UnknownVector& step = result.steps.emplace_back(pose_numbers + 1);

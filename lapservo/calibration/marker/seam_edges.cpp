@@ -57,8 +57,8 @@ struct Section {
   std::vector<double> px_per_m;
   std::vector<LampLight> lamp;
   std::vector<Profile> profiles;
-  std::array<double, 3> shaft{0.02, 0.02, 0.02};  // light of the bare shaft
-  std::size_t channels = 3;                       // 1 of a grey image: all show the same
+  std::array<double, 3> shaft{};  // light of the bare shaft
+  std::size_t channels = 3;       // 1 of a grey image: all show the same
 };
 
 struct SeamView {
@@ -106,6 +106,25 @@ int one_band(const Marker& marker, double tau_a_rad, double tau_b_rad, double al
   return a == b ? a : 0;
 }
 
+// The bare shaft beside the marker's ends, on the seam's azimuth.
+std::array<double, 3> shaft_light(const SeamView& view, double blur_px) {
+  const Marker& marker = view.marker();
+  std::array<std::vector<float>, 3> values;
+  for (int i = 0; i < 12; ++i) {
+    const double beyond_m = 1.5e-3 + 0.15e-3 * i + 2e-5 * blur_px;
+    for (const double along_m : {-beyond_m, marker.length_m() + beyond_m}) {
+      const Eigen::Vector2d px = view.scene.camera.raw_from_point(view.point(view.upper_rad, along_m));
+      if (!view.light.contains(px)) continue;
+      const auto at = view.light.at(static_cast<float>(px.x()), static_cast<float>(px.y()));
+      for (std::size_t c = 0; c < 3; ++c) values[c].push_back(at.light[c]);
+    }
+  }
+  std::array<double, 3> light{0.02, 0.02, 0.02};
+  for (std::size_t c = 0; c < 3; ++c)
+    if (values[c].size() >= 4) light[c] = static_cast<double>(median(values[c]));
+  return light;
+}
+
 std::optional<Section> sample(const SeamView& view, double facing_rad, double blur_px, double reach_m) {
   const Marker& marker = view.marker();
   const double radius_m = marker.radius_m(), gap_m = marker.gap_rad * radius_m;
@@ -142,8 +161,7 @@ std::optional<Section> sample(const SeamView& view, double facing_rad, double bl
     if (found == section.profiles.end()) {
       section.profiles.push_back({left, right, 0, 0, {}, {}});
       found = section.profiles.end() - 1;
-      found->light.resize(section.x_m.size());
-      found->count.resize(section.x_m.size());
+      found->light.resize(section.x_m.size()), found->count.resize(section.x_m.size());
     }
     found->stations += 1, found->along_m += along_m;
     for (std::size_t i = 0; i < section.x_m.size(); ++i) {
@@ -158,28 +176,8 @@ std::optional<Section> sample(const SeamView& view, double facing_rad, double bl
   std::erase_if(section.profiles, [](const Profile& p) { return p.stations < min_stations; });
   if (section.profiles.empty()) return std::nullopt;
   for (Profile& profile : section.profiles) profile.along_m /= profile.stations;
+  section.shaft = shaft_light(view, blur_px);
   return section;
-}
-
-// The bare shaft beside the marker's ends, on the seam's azimuth.
-std::array<double, 3> shaft_light(const SeamView& view, double blur_px) {
-  const Marker& marker = view.marker();
-  std::array<std::vector<float>, 3> values;
-  for (int i = 0; i < 12; ++i) {
-    const double beyond_m = 1.5e-3 + 0.15e-3 * i + 2e-5 * blur_px;
-    for (const double along_m : {-beyond_m, marker.length_m() + beyond_m}) {
-      const Eigen::Vector2d px = view.scene.camera.raw_from_point(view.point(view.upper_rad, along_m));
-      if (!view.light.contains(px)) continue;
-      const auto at = view.light.at(static_cast<float>(px.x()), static_cast<float>(px.y()));
-      for (std::size_t c = 0; c < 3; ++c) values[c].push_back(at.light[c]);
-    }
-  }
-  std::array<double, 3> light{0.02, 0.02, 0.02};
-  for (std::size_t c = 0; c < 3; ++c) {
-    if (values[c].size() < 4) continue;
-    light[c] = static_cast<double>(median(values[c]));
-  }
-  return light;
 }
 
 // The bands' and, beyond what the lamp does, their shading; the shaft's; the highlights'.
@@ -375,31 +373,19 @@ Section processed(const Section& section, const SeamFit& found, double seen_px, 
   return out;
 }
 
-// By all channels; what the processing moves the edges by is taken off.
-std::optional<SeamFit> fit_by_colours(const Section& section, const SeamSearch& search, double blur_px,
-                                      const std::optional<PictureProcessing>& processing,
-                                      const LightTable& light_of_value) {
-  auto found = fit(section, search, blur_px);
+// By one image, whose light is blurred by so much; what the processing of the one with all colours moves the edges by
+// is taken off.
+std::optional<SeamFit> fit_processed(const Section& fitted, double blur_px, const Section& colours, double colours_px,
+                                     const SeamSearch& search, const std::optional<PictureProcessing>& processing,
+                                     const LightTable& light_of_value) {
+  auto found = fit(fitted, search, blur_px);
   if (!found || !processing) return found;
-  const Section seen = processed(section, *found, blur_px, search.radius_m, *processing, light_of_value, false);
+  Section made =
+      processed(colours, *found, colours_px, search.radius_m, *processing, light_of_value, fitted.channels == 1);
+  made.channels = fitted.channels, made.shaft = fitted.shaft;
   SeamSearch again = search;
   again.expected_gap_m = found->gap_m;
-  if (const auto moved = fit(seen, again, blur_px)) take_off(*found, *moved);
-  return found;
-}
-
-// By the grey image: colour differences are blurred far wider, over the gap and into each other.
-std::optional<SeamFit> fit_by_luma(const Section& colours, const Section& grey, const SeamSearch& search,
-                                   double colours_px, const PictureProcessing& processing,
-                                   const LightTable& light_of_value) {
-  const double grey_px = std::sqrt(processing.blur_px * processing.blur_px + seam_sampling_px2);
-  auto found = fit(grey, search, grey_px);
-  if (!found) return std::nullopt;
-  Section made = processed(colours, *found, colours_px, search.radius_m, processing, light_of_value, true);
-  made.channels = grey.channels, made.shaft = grey.shaft;
-  SeamSearch again = search;
-  again.expected_gap_m = found->gap_m;
-  if (const auto moved = fit(made, again, grey_px)) take_off(*found, *moved);
+  if (const auto moved = fit(made, again, blur_px)) take_off(*found, *moved);
   return found;
 }
 
@@ -437,7 +423,6 @@ std::optional<SeamEdges> measure_seam(const Scene& scene, const LightImage& ligh
   if (std::abs(turned_upper_rad - marker.gap_rad / 2) > farthest_rad) return std::nullopt;
   auto section = sample(view, cylinder->facing_azimuth_rad, blur_px, reach_m);
   if (!section) return std::nullopt;
-  section->shaft = shaft_light(view, blur_px);
   double along_m = 0, weight = 0;
   for (const Profile& profile : section->profiles)
     along_m += profile.stations * profile.along_m, weight += profile.stations;
@@ -451,10 +436,12 @@ std::optional<SeamEdges> measure_seam(const Scene& scene, const LightImage& ligh
     const SeamView grey_view{scene, *grey, unknowns, view.axes, view.upper_rad};
     auto in_grey = sample(grey_view, cylinder->facing_azimuth_rad, blur_px, reach_m);
     if (!in_grey) return std::nullopt;
-    in_grey->shaft = shaft_light(grey_view, blur_px), in_grey->channels = 1;
-    found = fit_by_luma(*section, *in_grey, search, blur_px, *processing, light.light_of_value());
+    in_grey->channels = 1;
+    // Colour differences are blurred far wider, over the gap and into each other.
+    const double grey_px = std::sqrt(processing->blur_px * processing->blur_px + seam_sampling_px2);
+    found = fit_processed(*in_grey, grey_px, *section, blur_px, search, processing, light.light_of_value());
   } else {
-    found = fit_by_colours(*section, search, blur_px, processing, light.light_of_value());
+    found = fit_processed(*section, blur_px, *section, blur_px, search, processing, light.light_of_value());
   }
   if (!found) return std::nullopt;
 

@@ -14,10 +14,6 @@ namespace {
 
 constexpr double longest_pause_s = 0.5;
 
-double lerp(double from, double to, double fraction) {
-  return (1 - fraction) * from + fraction * to;
-}
-
 // Slope of one joint at a row: of the parabola through it and its neighbours, one-sided at ends and pauses.
 double slope_at(const JointRecording& r, std::size_t row, std::size_t joint) {
   const auto chord = [&](std::size_t from) {
@@ -41,8 +37,8 @@ std::optional<std::array<double, 4>> JointRecording::at(double at_s) const {
   const double from_s = time_s[i - 1], to_s = time_s[i];
   if (to_s - from_s > longest_pause_s) return std::nullopt;
   std::array<double, 4> result;
-  for (std::size_t j = 0; j < 4; ++j)
-    result[j] = lerp(joints[i - 1][j], joints[i][j], (at_s - from_s) / (to_s - from_s));
+  const double part = (at_s - from_s) / (to_s - from_s);
+  for (std::size_t j = 0; j < 4; ++j) result[j] = (1 - part) * joints[i - 1][j] + part * joints[i][j];
   return result;
 }
 

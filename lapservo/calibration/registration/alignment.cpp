@@ -47,10 +47,6 @@ double explained(const std::vector<Alignment::Pair>& pairs) {
 
 }  // namespace
 
-bool Alignment::drifts() const {
-  return std::abs(drift_ppm) > 3 * sigma_drift_ppm;
-}
-
 Alignment align(const Instrument& instrument, const std::vector<TimedPose>& poses, const JointRecording& recording,
                 const std::string& source) {
   Alignment result;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -26,7 +27,7 @@ struct Alignment {
   };
   std::vector<Pair> pairs;
 
-  bool drifts() const;  ///< beyond 3 sigmas
+  bool drifts() const { return std::abs(drift_ppm) > 3 * sigma_drift_ppm; }
 };
 
 /// From poses alone and the joints meanwhile, with clocks up to largest_delay_s (arm_start.h) apart beyond the

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "lapservo/calibration/fit/some_of.h"
+#include "lapservo/core/dense_matrix.h"
 #include "lapservo/core/error.h"
 #include "lapservo/core/statistics.h"
 
@@ -22,21 +23,23 @@ Eigen::VectorXd noise_of(const Eigen::MatrixXd& residuals) {
   return noise;
 }
 
-struct ModelFit {
-  ArmModel model;
-  FrameFit fit;
-};
+// Sigmas of an arm's numbers: from the residuals' scatter, times this, but nowhere smaller than from the information
+// alone: in directions that the motion leaves open, residuals scatter little.
+Eigen::MatrixXd arm_covariance(const FrameFit& fit) {
+  return covariance_at_least(unmodelled_sigmas * unmodelled_sigmas * fit.covariance, fit.independent);
+}
 
-std::optional<ModelFit> fit_model(const Instrument& instrument, const ArmStart& start, const JointRecording& recording,
-                                  const ArmFaults& free, const std::vector<JointFault>& held,
-                                  const AtIteration& at_iteration) {
+// Model and fit alone.
+std::optional<ArmFit> fit_model(const Instrument& instrument, const ArmStart& start, const JointRecording& recording,
+                                const ArmFaults& free, const std::vector<JointFault>& held,
+                                const AtIteration& at_iteration) {
   ArmFaults faults = free;
   faults.joints.insert(faults.joints.end(), held.begin(), held.end());
   ArmModel model(instrument, start, recording, faults);
   auto fit = fit_frames([&](const Eigen::VectorXd& x) { return model.residuals(x); }, model.unknowns(),
                         2 * poses_per_second(start.poses), at_iteration, held.size());
   if (!fit) return std::nullopt;
-  return ModelFit{std::move(model), std::move(*fit)};
+  return ArmFit{std::move(model), std::move(*fit), {}, {}, {}};
 }
 
 // The noise that a fault leaves, and the fault in words.
@@ -75,8 +78,8 @@ class Explainer {
  private:
   static constexpr std::size_t enough = 120;  // poses: more of them explain nothing better
 
-  std::optional<ModelFit> fit_to(const std::vector<TimedPose>& poses, const JointRecording& recording,
-                                 const ArmFaults& free) const {
+  std::optional<ArmFit> fit_to(const std::vector<TimedPose>& poses, const JointRecording& recording,
+                               const ArmFaults& free) const {
     try {
       const ArmStart start = start_arm(instrument_, poses, recording, source_);
       if (!start.refusal.empty()) return std::nullopt;
@@ -86,7 +89,7 @@ class Explainer {
     }
   }
 
-  void add(const ModelFit& fitted, std::string text) {
+  void add(const ArmFit& fitted, std::string text) {
     Explanation explained{noise_of(fitted.fit.residuals), std::move(text)};
     if (!best_ || explained.left() < best_->left()) best_ = std::move(explained);
   }
@@ -117,29 +120,27 @@ std::optional<ArmFit> fit_arm(const Instrument& instrument, const ArmStart& star
                               const ArmFaults& free, const AtIteration& at_iteration) {
   auto faults = sized_joint_faults(instrument.joints.value(), start.poses);
   std::erase_if(faults, [&](const JointFault& held) {
-    return std::any_of(free.joints.begin(), free.joints.end(),
-                       [&](const JointFault& fault) { return fault.text(0) == held.text(0); });
+    return std::ranges::any_of(free.joints, [&](const JointFault& fault) { return fault.text(0) == held.text(0); });
   });
-  auto fitted = fit_model(instrument, start, recording, free, faults, at_iteration);
-  if (!fitted) return std::nullopt;
-  ArmFit result{std::move(fitted->model), std::move(fitted->fit), {}, {}, {}};
-  result.noise = noise_of(result.fit.residuals);
-  result.covariance = arm_covariance(result.fit);
-  if (result.fit.departures.seen.empty()) return result;
+  auto result = fit_model(instrument, start, recording, free, faults, at_iteration);
+  if (!result) return std::nullopt;
+  result->noise = noise_of(result->fit.residuals);
+  result->covariance = arm_covariance(result->fit);
+  const Departures& without = result->fit.departures;
+  if (without.seen.empty()) return result;
   // To first order only: with those that are seen free, the fit shows by how much they put it off.
   ArmFaults with = free;
-  for (const Fault& seen : result.fit.departures.seen) with.joints.push_back(faults[seen.which]);
+  for (const Fault& seen : without.seen) with.joints.push_back(faults[seen.which]);
   const auto without_bias = fit_model(instrument, start, recording, with, faults, at_iteration);
   if (!without_bias) return std::nullopt;
-  const auto& [model, fit] = *without_bias;
-  const Eigen::Index numbers = result.fit.x.size();
-  const Eigen::VectorXd bias = result.fit.x - fit.x.head(numbers);
-  const Departures &with_seen = fit.departures, &without = result.fit.departures;
-  result.covariance = (arm_covariance(fit) + with_seen.by_seen).topLeftCorner(numbers, numbers) +
-                      bias * bias.transpose() + without.by_instead;
+  const FrameFit& fit = without_bias->fit;
+  const Eigen::Index numbers = result->fit.x.size(), joints = without_bias->model.blocks().joints.first;
+  const Eigen::VectorXd bias = result->fit.x - fit.x.head(numbers);
+  result->covariance = (arm_covariance(fit) + fit.departures.by_seen).topLeftCorner(numbers, numbers) +
+                       bias * bias.transpose() + without.by_instead;
   for (std::size_t k = free.joints.size(); k < with.joints.size(); ++k) {
-    const double size = fit.x[model.blocks().joints.first + static_cast<Eigen::Index>(k)];
-    if (std::abs(size) > with.joints[k].least) result.faults.push_back(with.joints[k].text(size));
+    const double size = fit.x[joints + static_cast<Eigen::Index>(k)];
+    if (std::abs(size) > with.joints[k].least) result->faults.push_back(with.joints[k].text(size));
   }
   return result;
 }

@@ -5,17 +5,12 @@
 
 #include <Eigen/Geometry>
 
-#include "lapservo/core/dense_matrix.h"
 #include "lapservo/geometry/rotation.h"
 #include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/rig/joint_conversion.h"
 #include "lapservo/robot/backlash.h"
 
 namespace lapservo::internal {
-
-Eigen::MatrixXd arm_covariance(const FrameFit& fit) {
-  return covariance_at_least(unmodelled_sigmas * unmodelled_sigmas * fit.covariance, fit.independent);
-}
 
 ArmModel::ArmModel(const Instrument& instrument, const ArmStart& start, const JointRecording& recording,
                    const ArmFaults& faults)
@@ -26,8 +21,7 @@ ArmModel::ArmModel(const Instrument& instrument, const ArmStart& start, const Jo
       faults_(faults.joints) {
   constexpr std::array<double, 4> least_travel{0.05, 0.05, 5e-3, 0.05};
   for (std::size_t j = 0; j < 4; ++j) {
-    const auto [low, high] = std::minmax_element(recording.joints.begin(), recording.joints.end(),
-                                                 [&](const auto& a, const auto& b) { return a[j] < b[j]; });
+    const auto [low, high] = std::ranges::minmax_element(recording.joints, {}, [=](const auto& at) { return at[j]; });
     if ((*high)[j] - (*low)[j] > least_travel[j]) moving_.push_back(j);
   }
   add_unknowns(start.delay_s, faults);
@@ -115,12 +109,11 @@ JointRecording ArmModel::mended(const Eigen::VectorXd& x) const {
 
 // A width below 0 is an instrument that leads as one above 0 lets it lag: derivatives go through 0.
 JointRecording ArmModel::behind_backlash(const Eigen::VectorXd& x) const {
-  const JointRecording motors = mended(x);
-  JointRecording instrument = motors;
+  JointRecording instrument = mended(x);
   for (std::size_t k = 0; k < moving_.size(); ++k) {
     const std::size_t j = moving_[k];
     const double width = blocks_.backlash.of(x)[static_cast<Eigen::Index>(k)], size = std::abs(width);
-    Backlash gap(motors.joints.front()[j]);
+    Backlash gap(instrument.joints.front()[j]);
     for (auto& joints : instrument.joints) {
       gap.follow(joints[j], size);
       const double behind = gap.instrument(size) - joints[j];

@@ -13,10 +13,6 @@
 
 namespace lapservo::internal {
 
-/// Sigmas of an arm's numbers: from the residuals' scatter, times this, but nowhere smaller than from the information
-/// alone: in directions that the motion leaves open, residuals scatter little.
-Eigen::MatrixXd arm_covariance(const FrameFit& fit);
-
 /// Which faults an arm's model may have beside a wrong registration.
 struct ArmFaults {
   bool drift = false;                ///< what the RCM frame moves by in the camera over the recording, steadily

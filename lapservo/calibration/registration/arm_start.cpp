@@ -2,13 +2,21 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
+#include <utility>
 
+#include <Eigen/Geometry>
+#include <Eigen/SVD>
 #include <fmt/format.h>
 
 #include "lapservo/calibration/registration/axes_meeting_point.h"
 #include "lapservo/calibration/registration/delay_search.h"
+#include "lapservo/core/angles.h"
 #include "lapservo/core/error.h"
 #include "lapservo/core/statistics.h"
+#include "lapservo/geometry/rotation.h"
+#include "lapservo/kinematics/rcm_kinematics.h"
+#include "lapservo/rig/joint_conversion.h"
 
 namespace lapservo::internal {
 namespace {
@@ -46,6 +54,121 @@ std::string clocks_text(const std::vector<TimedPose>& poses, const JointRecordin
                      joints_s > 100 * frames_s ? ": time_s looks like milliseconds" : "");
 }
 
+// The rotation that takes directions to others best (Kabsch 1976), and the mean square that is left.
+struct Turned {
+  Eigen::Matrix3d rotation;
+  double misfit;
+};
+
+Turned best_rotation(const std::vector<Eigen::Vector3d>& from, const std::vector<Eigen::Vector3d>& to) {
+  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+  for (std::size_t i = 0; i < from.size(); ++i) sum += to[i] * from[i].transpose();
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const double handed = (svd.matrixU() * svd.matrixV().transpose()).determinant();
+  const Eigen::Vector3d signs(1, 1, handed);
+  return {svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose(),
+          2 - 2 * svd.singularValues().dot(signs) / static_cast<double>(from.size())};
+}
+
+// By how many times the other sign of a joint has to explain the motion worse, as a mean square.
+constexpr double telling_misfit = 9;
+
+// Offset of phi and rotation for one sign of phi.
+struct Swing {
+  double sign, offset;
+  Turned turned;
+};
+
+Swing best_swing(const std::vector<TimedPose>& poses, const std::vector<std::array<double, 4>>& joints,
+                 const Joints& given, double sign) {
+  std::vector<Eigen::Vector3d> axes, shafts(poses.size());
+  for (const TimedPose& pose : poses) axes.push_back(pose.axis());
+  double mean = 0;
+  for (const auto& at : joints) mean += at[1] / static_cast<double>(joints.size());
+  const auto turned_at = [&](double offset) {
+    for (std::size_t i = 0; i < joints.size(); ++i) {
+      const double theta_rad = given.sign[0] * joints[i][0] + given.offset[0], phi_rad = sign * joints[i][1] + offset;
+      shafts[i] = shaft_axis_in_rcm({theta_rad, phi_rad, 0, 0});
+    }
+    return best_rotation(shafts, axes);
+  };
+  Swing best{sign, 0, {Eigen::Matrix3d::Identity(), 1e300}};
+  const auto consider = [&](double offset) {
+    if (const Turned turned = turned_at(offset); turned.misfit < best.turned.misfit) best = {sign, offset, turned};
+  };
+  // phi and -phi (with theta turned by pi) are the same axis: of both, phi lies between 0 and pi in the mean.
+  constexpr int parts = 60;
+  for (int i = 1; i < parts; ++i) consider(pi * i / parts - sign * mean);
+  for (double step = pi / parts / 2; step > 1e-4; step /= 2)
+    for (const double offset : {best.offset - step, best.offset + step}) consider(offset);
+  return best;
+}
+
+// Turning the RCM frame by pi about its x axis changes the signs of theta and phi, and psi by pi.
+void turn_over(Rigid3& camera_from_rcm, Joints& joints) {
+  camera_from_rcm.rotation = camera_from_rcm.rotation * Eigen::AngleAxisd(pi, Eigen::Vector3d::UnitX());
+  // theta' = -theta - (what keeps its offset the rig's) is a turn about z.
+  camera_from_rcm.rotation =
+      camera_from_rcm.rotation * Eigen::AngleAxisd(-2 * joints.offset[0], Eigen::Vector3d::UnitZ());
+  joints.sign[0] *= -1, joints.sign[1] *= -1;
+  joints.offset[1] = pi - joints.offset[1];
+}
+
+// psi as the joint's sign makes it agree with the turns seen: direction and length of the mean of exp(i difference).
+std::complex<double> mean_turn(const std::vector<TimedPose>& poses, const std::vector<std::array<double, 4>>& joints,
+                               const Marker& marker, const ArmGuess& guess, double sign) {
+  std::complex<double> sum = 0;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const auto q = JointVector::from_vector(q_from_joints(guess.joints, Eigen::Vector4d(joints[i].data())));
+    const Rigid3 unturned = camera_from_marker(marker, guess.camera_from_rcm * rcm_from_unrolled(q), 0);
+    const double psi_rad = roll_between_rad(unturned.rotation, poses[i].marker.camera_from_marker.rotation);
+    sum += std::polar(1.0, psi_rad - sign * joints[i][3]);
+  }
+  return sum / static_cast<double>(poses.size());
+}
+
+// Signs, offsets and rotation by the axes and rolls of poses whose joints are known; `rcm_m`: the intersection of the
+// axes. Among equal descriptions it returns that which register_arm() promises.
+ArmGuess guess_arm(const Instrument& instrument, const std::vector<TimedPose>& poses,
+                   const std::vector<std::array<double, 4>>& joints, const Eigen::Vector3d& rcm_m,
+                   double rho_per_joint) {
+  ArmGuess guess;
+  guess.joints = instrument.joints.value();
+  std::array swings{best_swing(poses, joints, guess.joints, 1), best_swing(poses, joints, guess.joints, -1)};
+  if (swings[1].turned.misfit < swings[0].turned.misfit) std::swap(swings[0], swings[1]);
+  const Swing& swing = swings[0];
+  if (swings[1].turned.misfit < telling_misfit * swing.turned.misfit) guess.open_sign = 1;
+  guess.misfit_rad = std::sqrt(std::max(0.0, swing.turned.misfit));
+  guess.camera_from_rcm = {Eigen::Quaterniond(swing.turned.rotation).normalized(), rcm_m};
+  guess.joints.sign[1] = swing.sign, guess.joints.offset[1] = swing.offset;
+  if (instrument.camera_from_rcm) {
+    ArmGuess over = guess;
+    turn_over(over.camera_from_rcm, over.joints);
+    const Eigen::Quaterniond& given = instrument.camera_from_rcm->rotation;
+    if (given.angularDistance(over.camera_from_rcm.rotation) < given.angularDistance(guess.camera_from_rcm.rotation))
+      guess = over;
+  }
+
+  constexpr double least_slope = 0.5;
+  guess.joints.sign[2] = rho_per_joint < 0 ? -1 : 1;
+  if (std::abs(rho_per_joint) < least_slope) guess.open_sign = 2;
+  std::vector<double> offsets_m;
+  for (std::size_t i = 0; i < poses.size(); ++i)
+    offsets_m.push_back((poses[i].origin() - rcm_m).dot(poses[i].axis()) - guess.joints.sign[2] * joints[i][2]);
+  guess.joints.offset[2] = median(offsets_m);
+
+  auto turn = mean_turn(poses, joints, instrument.marker, guess, 1);
+  auto other = mean_turn(poses, joints, instrument.marker, guess, -1);
+  guess.joints.sign[3] = std::abs(turn) > std::abs(other) ? 1 : -1;
+  if (guess.joints.sign[3] < 0) std::swap(turn, other);
+  if (1 - std::abs(other) < telling_misfit * (1 - std::abs(turn))) guess.open_sign = 3;
+  // As the rig has it, but for what a rig may not hold.
+  const double before_rad = instrument.joints->offset[3],
+               offset_rad = before_rad + wrap_pi(std::arg(turn) - before_rad);
+  guess.joints.offset[3] = std::abs(offset_rad) < two_pi ? offset_rad : wrap_pi(offset_rad);
+  return guess;
+}
+
 }  // namespace
 
 std::string too_few_poses(std::size_t poses) {
@@ -55,8 +178,7 @@ std::string too_few_poses(std::size_t poses) {
 std::string ambiguous_delay(const ArmStart& start) {
   return fmt::format(
       "the motion repeats: at a delay of {:.2f} s the joints explain it about as well as at {:.2f} s: swing "
-      "irregularly, "
-      "or cut both recordings to less than a period",
+      "irregularly, or cut both recordings to less than a period",
       start.other_delays_s.front(), start.delay_s);
 }
 
@@ -82,8 +204,7 @@ ArmStart start_arm(const Instrument& instrument, const std::vector<TimedPose>& p
   const auto foreign = [&](const std::string& how) {
     start.refusal = fmt::format(
         "the joints do not move as the marker does ({}): is it this arm's recording, are names in the order theta, "
-        "phi, "
-        "rho, psi, do both clocks run within 30 s of each other ({})",
+        "phi, rho, psi, do both clocks run within 30 s of each other ({})",
         how, clocks_text(poses, recording));
     return start;
   };

@@ -2,11 +2,11 @@
 
 #include <array>
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "lapservo/calibration/recording/joint_recording.h"
-#include "lapservo/calibration/registration/arm_guess.h"
 #include "lapservo/calibration/registration/timed_pose.h"
 #include "lapservo/rig/joint_travel.h"
 #include "lapservo/rig/rig.h"
@@ -18,6 +18,14 @@ inline constexpr std::size_t min_registration_poses = 40;
 inline constexpr auto swing_more =
     "swing the instrument by 0.5 rad in both directions, insert it by 20 mm and turn it, in 20 s or more";
 std::string too_few_poses(std::size_t poses);
+
+/// Where an arm stands, about: to start a fit from.
+struct ArmGuess {
+  Rigid3 camera_from_rcm;
+  Joints joints;
+  double misfit_rad = 0;                 ///< rms of the axes about it
+  std::optional<std::size_t> open_sign;  ///< a joint whose other sign explains the motion about as well
+};
 
 /// The start of a fit of an arm.
 struct ArmStart {

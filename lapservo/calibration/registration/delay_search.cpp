@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <utility>
 
 #include <Eigen/LU>
@@ -120,10 +121,6 @@ class Matcher {
   std::size_t needed_;
 };
 
-void sort_by_score(std::vector<DelayMatch>& matches) {
-  std::sort(matches.begin(), matches.end(), [](const auto& a, const auto& b) { return a.score > b.score; });
-}
-
 }  // namespace
 
 std::vector<DelayMatch> search_delay(const std::vector<TimedPose>& poses, const std::vector<double>& rho_m,
@@ -140,10 +137,10 @@ std::vector<DelayMatch> search_delay(const std::vector<TimedPose>& poses, const 
     const double before = i > 0 ? all[i - 1].score : -1, after = i + 1 < all.size() ? all[i + 1].score : -1;
     if (all[i].score >= 0 && all[i].score >= before && all[i].score > after) peaks.push_back(all[i]);
   }
-  sort_by_score(peaks);
+  std::ranges::sort(peaks, std::greater{}, &DelayMatch::score);
   peaks.resize(std::min(peaks.size(), peaks_to_refine));
   for (DelayMatch& peak : peaks) peak = matcher.refined(peak);
-  sort_by_score(peaks);
+  std::ranges::sort(peaks, std::greater{}, &DelayMatch::score);
   std::erase_if(peaks, [best = peaks.empty() ? 0 : peaks.front().score, rival](const DelayMatch& peak) {
     return peak.score < best - rival;
   });

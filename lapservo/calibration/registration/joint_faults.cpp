@@ -1,10 +1,10 @@
 #include "lapservo/calibration/registration/joint_faults.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <utility>
 
+#include <Eigen/Geometry>
 #include <fmt/format.h>
 
 #include "lapservo/core/angles.h"
@@ -122,14 +122,25 @@ JointFault focal_fault() {
           0.3};
 }
 
+std::vector<TimedPose> with_focal(std::vector<TimedPose> poses, double longer) {
+  for (TimedPose& pose : poses) {
+    const Eigen::Vector3d axis = pose.axis(), along_view(0, 0, axis.z());
+    Rigid3& camera_from_marker = pose.marker.camera_from_marker;
+    camera_from_marker.translation.z() *= 1 + longer;
+    const Eigen::Quaterniond turn = Eigen::Quaterniond::FromTwoVectors(axis, axis + longer * along_view);
+    camera_from_marker.rotation = (turn * camera_from_marker.rotation).normalized();
+    pose.by_focal = {{0, 0, pose.origin().z()}, pose.axis().cross(Eigen::Vector3d(0, 0, pose.axis().z()))};
+  }
+  return poses;
+}
+
 JointFault clock_fault(const std::vector<TimedPose>& poses) {
   const double period_s = frame_period_s(poses);
   return {
       [=](double size) {
         return fmt::format(
-            "the images' clock runs {:.4f} times as fast as the joints': if they are {:.4g} images a second, "
-            "read as {:.4g}, give --fps for a folder, or write the video anew at its own rate; else stamp both by one "
-            "clock",
+            "the images' clock runs {:.4f} times as fast as the joints': if they are {:.4g} images a second, read as "
+            "{:.4g}, give --fps for a folder, or write the video anew at its own rate; else stamp both by one clock",
             1 + size, (1 + size) / period_s, 1 / period_s);
       },
       [](JointRecording& r, double size) {
@@ -166,12 +177,12 @@ std::vector<JointFault> other_joint_faults(const Joints& joints) {
                         }});
   faults.push_back({[](double) { return std::string("an angle wraps: record it without jumps of a turn"); },
                     [](JointRecording& r, double) { unwrap(r); }});
-  faults.push_back({[](double) {
-                      return std::string(
-                          "readings are held: each is there several times; record them at the rate "
-                          "at which they are new");
-                    },
-                    [](JointRecording& r, double) { drop_repeated(r); }});
+  faults.push_back(
+      {[](double) {
+         return std::string(
+             "readings are held: each is there several times; record them at the rate at which they are new");
+       },
+       [](JointRecording& r, double) { drop_repeated(r); }});
   return faults;
 }
 

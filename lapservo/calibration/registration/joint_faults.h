@@ -26,6 +26,10 @@ struct JointFault {
 /// Another focal length of the camera than that by which the poses were found.
 JointFault focal_fault();
 
+/// The poses as a focal length that is longer by this part has them, with their ByFocal: depths grow by it, the image
+/// stays.
+std::vector<TimedPose> with_focal(std::vector<TimedPose> poses, double longer);
+
 /// An images' clock that runs (1 + size) times as fast as the joints', whose stamps it mends about the first one.
 JointFault clock_fault(const std::vector<TimedPose>& poses);
 

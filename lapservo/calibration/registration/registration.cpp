@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
 #include <Eigen/Geometry>
 #include <fmt/format.h>
@@ -11,6 +10,7 @@
 #include "lapservo/calibration/registration/arm_fit.h"
 #include "lapservo/calibration/registration/arm_start.h"
 #include "lapservo/calibration/registration/axes_meeting_point.h"
+#include "lapservo/calibration/registration/joint_faults.h"
 #include "lapservo/core/statistics.h"
 #include "lapservo/geometry/rotation.h"
 #include "lapservo/kinematics/rcm_kinematics.h"

@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <optional>
 #include <vector>
+
+#include <fmt/format.h>
 
 #include "lapservo/core/angles.h"
 #include "lapservo/core/statistics.h"
@@ -48,13 +49,10 @@ SeamRegistration register_seam(const Instrument& instrument, const MarkerCalibra
   }
   result.frames = differences.size();
   if (differences.size() < min_seam_frames) {
-    char text[240];
-    std::snprintf(
-        text, sizeof text,
-        "%zu frames lie within the recording of the joints, at least %zu are needed: the frames run from %.2f "
-        "to %.2f s, the recording from %.2f to %.2f s",
+    result.refusal = fmt::format(
+        "{} frames lie within the recording of the joints, at least {} are needed: the frames run from {:.2f} to "
+        "{:.2f} s, the recording from {:.2f} to {:.2f} s",
         differences.size(), min_seam_frames, first_s, last_s, recording.time_s.front(), recording.time_s.back());
-    result.refusal = text;
     return result;
   }
   // About the direction of most, then the median, then the mean of what is near it.

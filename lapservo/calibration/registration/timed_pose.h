@@ -34,11 +34,7 @@ inline constexpr auto reversed_marker =
     "the marker points away from the tip: it is mounted the wrong way round; its proximal end (band 0) belongs to the "
     "trocar";
 
-/// The poses as a focal length that is longer by this part has them, with their ByFocal: depths grow by it, the image
-/// stays.
-std::vector<TimedPose> with_focal(std::vector<TimedPose> poses, double longer);
-
-/// How many of them there are in a second: over about as many, what is wrong with them stays alike.
+/// How many poses there are in a second: over about as many, what is wrong with them stays alike.
 inline std::size_t poses_per_second(const std::vector<TimedPose>& poses) {
   const double span_s = poses.empty() ? 0 : poses.back().time_s - poses.front().time_s;
   return span_s > 0 ? static_cast<std::size_t>(std::clamp(static_cast<double>(poses.size()) / span_s, 1.0, 120.0)) : 1;

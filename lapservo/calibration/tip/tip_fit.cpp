@@ -63,9 +63,8 @@ Eigen::Matrix3d in_sigmas(const TimedPose& pose, const Eigen::Vector3d& tip_in_m
 
 bool is_bent_differently(const std::vector<TipSighting>& sightings) {
   for (std::size_t joint = 0; joint < sightings.front().wrist_rad.size(); ++joint) {
-    const auto [low, high] = std::minmax_element(sightings.begin(), sightings.end(), [=](const auto& a, const auto& b) {
-      return a.wrist_rad[joint] < b.wrist_rad[joint];
-    });
+    const auto [low, high] =
+        std::ranges::minmax_element(sightings, {}, [=](const TipSighting& seen) { return seen.wrist_rad[joint]; });
     if (high->wrist_rad[joint] - low->wrist_rad[joint] > bent_differently_rad) return true;
   }
   return false;

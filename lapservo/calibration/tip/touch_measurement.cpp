@@ -42,10 +42,6 @@ std::optional<Rigid3> pose_of_board(const Board& board, const Camera& camera, co
   return rms_px < max_rms_px ? std::optional(pose) : std::nullopt;
 }
 
-Eigen::Vector2i turned(const Board& board, const Eigen::Vector2i& corner) {
-  return {board.columns - 1 - corner.x(), board.rows - 1 - corner.y()};
-}
-
 }  // namespace
 
 std::vector<TouchImage> read_touches(const std::filesystem::path& table, const Board& board, const Tool& tool) {
@@ -111,7 +107,8 @@ TouchMeasurement measure_touches(const Rig& rig, std::size_t instrument, const T
     if (is_turned && !board.dictionary.empty()) break;
     std::vector<std::string> names;
     for (std::size_t i = 0; i < touches.size(); ++i) {
-      const Eigen::Vector2i at = is_turned ? turned(board, *seen[i]->corner) : *seen[i]->corner;
+      Eigen::Vector2i at = *seen[i]->corner;
+      if (is_turned) at = Eigen::Vector2i(board.columns - 1, board.rows - 1) - at;
       touches[i].point_in_camera_m = *camera_from_board * board.corner_m(at.x(), at.y());
       names.push_back(seen[i]->file.string());
     }

@@ -1,7 +1,9 @@
-#include "lapservo/calibration/colour/band_samples.h"
+#include "lapservo/calibration/colour/light.h"
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <vector>
 
 #include "lapservo/core/statistics.h"
 #include "lapservo/geometry/cylinder.h"
@@ -11,15 +13,17 @@
 
 namespace lapservo::internal {
 
-std::vector<BandSample> band_samples(const cv::Mat& bgr, const Camera& camera, const Marker& marker,
-                                     const ShaftPose& pose, double clear_px) {
+std::optional<MarkerLight> light_of_marker(const cv::Mat& bgr, const Camera& camera, const Marker& marker,
+                                           const ShaftPose& pose) {
   constexpr int azimuths = 13, places = 60;
+  constexpr double clear_px = 3;
   constexpr double reach = 0.7;  // of the visible half angle: beyond, it is dark and the background is near
-  std::vector<BandSample> samples;
   const auto view = view_cylinder(pose.camera_from_unrolled, marker.radius_m());
-  if (!view) return samples;
-  const double px_per_m = camera.fx_px / std::max(1e-3, pose.camera_from_unrolled.translation.z());
-  const double clear_m = clear_px / px_per_m;
+  if (!view) return std::nullopt;
+  const double clear_m = clear_px / (camera.fx_px / std::max(1e-3, pose.camera_from_unrolled.translation.z()));
+  std::vector<double> values, chromas;
+  std::array<std::vector<double>, 3> beyond_deg;
+  std::size_t clipped = 0;
   for (int i = 0; i < azimuths; ++i) {
     const double azimuth_rad = visible_azimuth_rad(*view, reach, i, azimuths);
     const double tau_rad = marker_azimuth_rad(marker, azimuth_rad, pose.psi_rad);
@@ -37,31 +41,35 @@ std::vector<BandSample> band_samples(const cv::Mat& bgr, const Camera& camera, c
       if (!camera.contains(px, 1)) continue;
       const auto& pixel =
           bgr.at<cv::Vec3b>(static_cast<int>(std::lround(px.y())), static_cast<int>(std::lround(px.x())));
-      samples.push_back({band, {pixel[0], pixel[1], pixel[2]}});
+      const auto [low, high] = std::minmax({pixel[0], pixel[1], pixel[2]});
+      values.push_back(high), chromas.push_back(high - low);
+      clipped += high >= LightImage::saturated_value;
+      if (const auto hue_deg = hue_deg_of(pixel[0], pixel[1], pixel[2]))
+        beyond_deg[band].push_back(std::remainder(*hue_deg - marker.hues_deg[band], 360.0));
     }
   }
-  return samples;
-}
-
-MarkerLight light_of(const std::vector<BandSample>& samples, const Marker& marker) {
+  if (values.empty()) return std::nullopt;
   MarkerLight light;
-  std::vector<double> values, chromas;
-  std::array<std::vector<double>, 3> beyond_deg;
-  std::size_t clipped = 0;
-  for (const BandSample& sample : samples) {
-    const auto [low, high] = std::minmax_element(sample.bgr.begin(), sample.bgr.end());
-    values.push_back(*high), chromas.push_back(*high - *low);
-    clipped += *high >= LightImage::saturated_value;
-    const auto hue_deg = hue_deg_of(sample.bgr[0], sample.bgr[1], sample.bgr[2]);
-    if (!hue_deg) continue;
-    beyond_deg[sample.band].push_back(std::remainder(*hue_deg - marker.hues_deg[sample.band], 360.0));
-  }
-  const auto count = static_cast<double>(samples.size());
-  light.clipped = static_cast<double>(clipped) / count;
+  light.clipped = static_cast<double>(clipped) / static_cast<double>(values.size());
   light.value = median(values), light.chroma = median(chromas);
   for (std::size_t band = 0; band < 3; ++band)
     light.hues_deg[band] = marker.hues_deg[band] + (beyond_deg[band].empty() ? 0 : median(beyond_deg[band]));
   return light;
+}
+
+PictureLight light_of_picture(const cv::Mat& bgr) {
+  constexpr int every = 16;  // pixels
+  std::vector<int> brightest;
+  int clipped = 0;
+  for (int v = every / 2; v < bgr.rows; v += every)
+    for (int u = every / 2; u < bgr.cols; u += every) {
+      const auto& pixel = bgr.at<cv::Vec3b>(v, u);
+      brightest.push_back(std::max({pixel[0], pixel[1], pixel[2]}));
+      clipped += brightest.back() >= LightImage::saturated_value;
+    }
+  if (brightest.empty()) return {};
+  const double share = static_cast<double>(clipped) / static_cast<double>(brightest.size());
+  return {static_cast<double>(quantile(brightest, 0.9)), share};
 }
 
 }  // namespace lapservo::internal
