@@ -232,6 +232,7 @@ class SafeTracker {
   void set_wrist(const std::string& instrument, const std::vector<double>& wrist_rad) {
     const auto index = internal::instrument_index(*rig_, instrument);
     if (!index) throw InputError("set_wrist", "instrument", instrument, "an instrument of the rig");
+    const py::gil_scoped_release others_run;
     const std::lock_guard lock(mutex_);
     tracker_.set_wrist(*index, wrist_rad);
   }

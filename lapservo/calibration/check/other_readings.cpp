@@ -62,8 +62,8 @@ class OtherReadings {
   template <typename Change>
   bool found_with_rig(Change change) const {
     Rig rig = rig_;
-    for (Instrument& instrument : rig.instruments) instrument.camera_from_rcm.reset();
     change(rig);
+    for (Instrument& instrument : rig.instruments) instrument.camera_from_rcm.reset();
     for (const Instrument& instrument : rig.instruments)
       if (marker_problem(instrument.marker)) return false;
     Tracker tracker(rig, {.single = true, .deinterlace = deinterlaced_});

@@ -122,7 +122,7 @@ MarkerResponse::MarkerResponse(const Camera& camera) : camera_(camera) {
   add("as it is", camera.response);
   add("srgb", {Response::Kind::srgb}), add("rec709", {Response::Kind::rec709}), add("linear", {Response::Kind::power});
   for (const auto& [name, gamma] :
-       {std::pair("gamma:1.8", 1.8), {"gamma:2.0", 2.0}, {"gamma:2.2", 2.2}, {"gamma:2.4", 2.4}})
+       {std::pair("gamma:1.8", 1.8), {"gamma:2", 2.0}, {"gamma:2.2", 2.2}, {"gamma:2.4", 2.4}})
     add(name, {Response::Kind::power, gamma});
 }
 

@@ -29,7 +29,7 @@ std::optional<std::array<double, 4>> readings_at(const Marker& marker, const Rig
 
 // The part of the variance of each joint's motion that the readings explain; the smallest, without the worst tenth.
 double explained(const std::vector<Alignment::Pair>& pairs) {
-  double least = 1;
+  double least = pairs.empty() ? 0 : 1;
   for (std::size_t j = 0; j < 4; ++j) {
     double sum = 0, squares = 0;
     std::vector<double> misses;

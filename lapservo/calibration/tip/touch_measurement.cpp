@@ -113,8 +113,8 @@ TouchMeasurement measure_touches(const Rig& rig, std::size_t instrument, const T
       names.push_back(seen[i]->file.string());
     }
     TipCalibration calibration = touched_tip(tool, touches, names);
-    if (!is_turned || rms(calibration.misses_m) < rms(result.calibration.misses_m))
-      result.calibration = std::move(calibration);
+    const auto miss_m = [](const TipCalibration& of) { return of.misses_m.empty() ? HUGE_VAL : rms(of.misses_m); };
+    if (!is_turned || miss_m(calibration) < miss_m(result.calibration)) result.calibration = std::move(calibration);
   }
   return result;
 }
