@@ -309,7 +309,7 @@ TEST_F(CalibrateTipTool, FindsTheTipByAPivotOrSaysWhyNot) {
   expect_in(errors(), "the tip slipped at about 8 s");
   EXPECT_EQ(testing::read_file("tip.yaml"), before);
   ToolTest::expect_refused("calibrate tip" + to, {"--pivot, --touch or --calliper"});
-  ToolTest::expect_refused("calibrate tip --calliper 20,5" + to, {"20,5", "MM:SIGMA"});
+  ToolTest::expect_refused("calibrate tip --calliper 20,5 --rig rig.yaml --out tip.yaml", {"20,5", "MM:SIGMA"});
   expect_done("calibrate tip --calliper 20.5:0.05 --rig rig.yaml --out calliper.yaml");
   const Tool::Place place = load_rig("calliper.yaml").instruments[0].tool.value().place.value();
   EXPECT_NEAR(place.base_in_marker_m.z(), rig.instruments[0].marker.length_m() + 0.0205, 1e-9);

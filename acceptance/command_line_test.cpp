@@ -21,6 +21,7 @@
 #include "acceptance/tool_test.h"
 #include "lapservo/core/csv.h"
 #include "lapservo/crtk/messages.h"
+#include "lapservo/rig/calibration_record.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/sim/boards.h"
 #ifdef LAPSERVO_TEST_BAGS
@@ -715,12 +716,49 @@ TEST_F(CommandLine, CalibrateAllSaysWhatItDidNot) {
   write_grey("in/grey.png");
   expect_refused(start + " --boards in/grey.png", {"needs --board and --square-mm"});
   expect_refused(start + " --redo marker", {"--redo: marker needs --turn"});
+  expect_refused(start + " --joint-topic /x --turn in/grey.png", {"--joint-topic: is /x, which is for bags"});
+  expect_refused(start + " --report page.yaml", {"page.yaml", ".html"});
   expect_refused(start + " --turn /dev/video0", {"expected a folder with files"});
+}
+
+// Though the check was done.
+TEST_F(CommandLine, CalibrateAllWritesAPageThatIsNotThere) {
+  const std::string rig = in("mine.yaml", read_file("configs/example.yaml"));
+  write_grey("in/grey.png");
+  write_record(
+      "in/mine.calibration.yaml",
+      {rig_state(rig),
+       {{"check", "lapservo check in/grey.png --rig in/mine.yaml --fps 30", input_state("in/grey.png"), "2026"}}});
+  const std::string all = "calibrate all --no-questions --check in/grey.png --rig " + rig;
+  expect_done(all);
+  expect_in(output(), "check: done on 2026");
+  EXPECT_EQ(run(all + " --report out/check.html"), 1);
+  EXPECT_TRUE(fs::exists("out/check.html"));
+  EXPECT_EQ(errors().find("goes on"), std::string::npos) << "the verdict is no stop";
+}
+
+// On a terminal, the check's recording is another than the swing, which is left out.
+TEST_F(CommandLine, CalibrateAllTakesTheSwingsJointsForNoOtherRecording) {
+  const std::string all =
+      LAPSERVO_TOOL " calibrate all --joints in/joints.csv --rig " + in("mine.yaml", read_file("configs/example.yaml"));
+  write_grey("in/grey.png");
+  ASSERT_EQ(
+      std::system(("printf '\\n\\n\\n\\nin/grey.png\\n\\n' | script -qec '" + all + "' /dev/null >stdout").c_str()),
+      1 << 8);
+  expect_in(output(), "lapservo check in/grey.png --rig in/mine.yaml --fps 30");
 }
 
 TEST_F(CommandLine, SamplesGoIntoAnEmptyFolder) {
   in("kept", "");
   expect_refused("sample in", {"in: is not empty, expected a new or an empty folder"});
+}
+
+TEST_F(CommandLine, CalibrationsRefuseWhatTheyWouldIgnore) {
+  const std::string to = " --rig configs/example.yaml --out out/rig.yaml";
+  expect_refused("calibrate registration in/seen.csv --fps 8" + to, {"--fps: is of frames", "a CSV"});
+  expect_refused("calibrate tip --calliper 20 --eye left" + to, {"--eye", "--pivot"});
+  expect_refused("calibrate tip --calliper 20 --deinterlace" + to, {"--deinterlace", "--touch"});
+  expect_refused("calibrate tip --pivot in/tip --board 9x6" + to, {"--board", "--touch"});
 }
 
 TEST_F(CommandLine, CalibrateCameraRefusesBadInput) {

@@ -240,8 +240,10 @@ Joints parse_joints(const YamlField& field) {
   for (const double sign : joints.sign)
     if (std::abs(sign) != 1) signs.fail(std::to_string(sign), "1 or -1");
   joints.offset = field["offset"].numbers<4>("four numbers, rad rad m rad", 100, "an offset within 100 rad or m");
-  constexpr double turn = 6.2832;  // psi's is known but for whole turns
-  expect_radians_and_metres(field["offset"], joints.offset, {{turn, turn, 1, turn}});
+  // From a joint's reading to a configuration; psi's is known but for whole turns.
+  JointUnits offsets = joint_positions;
+  for (const std::size_t i : {0U, 1U, 2U}) offsets.most[i] *= 2;
+  expect_radians_and_metres(field["offset"], joints.offset, offsets);
   joints.sigma_offset = sigmas_in<4>(field, "sigma_offset");
   return joints;
 }

@@ -243,7 +243,7 @@ const std::string four = "expected four different names, of theta, phi, rho and 
 const std::string joints = "instruments[0].joints.";
 const Complaints impossible_joints{
     {with_joints(names, sign, "[0, 90, -0.0156, 0]"),
-     joints + "offset: is a list of 4, expected radians within 6.283 for number 2: 90 looks like degrees"},
+     joints + "offset: is a list of 4, expected radians within 12.57 for number 2: 90 looks like degrees"},
     {with_joints("[a, b, c]", sign, offset), joints + "names: is a list of 3, " + four},
     {with_joints("[a, b, a, d]", sign, offset), joints + "names[2]: is a, " + four},
     {with_joints("[a, b, 'c,', d]", sign, offset), joints + "names[2]: is c,, " + four},

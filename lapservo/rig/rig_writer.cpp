@@ -235,4 +235,11 @@ std::string rig_yaml(const Rig& rig, const fs::path& destination) {
   return lines.text();
 }
 
+std::string measured_rig_yaml(const Rig& rig, const fs::path& destination) {
+  const std::string yaml = rig_yaml(rig, destination);
+  parse_rig(yaml, fmt::format("{} as it would be written", destination.empty() ? "rig" : destination.string()),
+            destination.parent_path());
+  return yaml;
+}
+
 }  // namespace lapservo::internal

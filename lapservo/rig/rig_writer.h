@@ -11,6 +11,9 @@ namespace lapservo::internal {
 /// named so that it is found from there; else the camera stands in the rig itself.
 std::string rig_yaml(const Rig& rig, const std::filesystem::path& destination = {});
 
+/// The same of a rig that was measured. Throws InputError naming the file where parse_rig() would not take it.
+std::string measured_rig_yaml(const Rig& rig, const std::filesystem::path& destination);
+
 /// The lines of a camera file, or of a rig's `camera`, each after so many spaces.
 std::string camera_yaml(const Camera& camera, int indent = 0);
 

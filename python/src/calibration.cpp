@@ -76,7 +76,7 @@ py::dict result_of(std::optional<GivenRig> measured, const Camera& camera, const
                    const std::string& complaint) {
   py::list rows;
   for (const CalibratedNumber& n : numbers) rows.append(py::make_tuple(n.name, n.before, n.after, n.sigma));
-  py::dict result("yaml"_a = measured ? rig_yaml(measured->rig, measured->path) : camera_yaml(camera),
+  py::dict result("yaml"_a = measured ? measured_rig_yaml(measured->rig, measured->path) : camera_yaml(camera),
                   "numbers"_a = rows, "complaint"_a = complaint, "faults"_a = py::list(), "rig"_a = py::none());
   if (!measured) return result;
   result["rig"] = py::cast(with_absolute_files(std::move(measured->rig)));
@@ -290,7 +290,7 @@ void bind_calibration(py::module_& m) {
     std::error_code error;
     if (rig && !rig->camera_file.empty() && fs::equivalent(rig->camera_file, path, error))
       throw InputError(path.string(), "is the camera's own file, which the rig names, expected another path");
-    write_file(path, rig ? rig_yaml(*rig, path) : yaml);
+    write_file(path, rig ? measured_rig_yaml(*rig, path) : yaml);
   });
 }
 

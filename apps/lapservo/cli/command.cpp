@@ -133,6 +133,11 @@ std::vector<std::string> Command::given() const {
   return names;
 }
 
+void Command::refuse(const std::vector<std::string>& names, const std::string& why) const {
+  for (const std::string& name : given())
+    if (std::find(names.begin(), names.end(), name) != names.end()) throw InputError(name, why);
+}
+
 void Command::runs(Run& run_later, Run run) {
   app_->callback([&run_later, run = std::move(run)] { run_later = run; });
 }

@@ -58,6 +58,8 @@ class Command {
   void footer(const std::string& text);
   /// The options that the command line gives, as "--rig"; after it was parsed.
   std::vector<std::string> given() const;
+  /// Throws InputError with `why` where it gives one of these, which would be ignored.
+  void refuse(const std::vector<std::string>& names, const std::string& why) const;
   /// Sets `run_later` when the command line names this subcommand.
   void runs(Run& run_later, Run run);
 

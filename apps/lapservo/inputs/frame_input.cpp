@@ -6,6 +6,7 @@
 #include <set>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "apps/lapservo/cli/interrupt.h"
 #include "cameras/camera.h"
@@ -140,6 +141,10 @@ void add_video_options(Command command, FrameOptions& options) {
       .add_option("--chroma-location", options.chroma_location,
                   "Place of the samples of chroma of a video, whatever it names; else as it names")
       .one_of({"left", "centre", "top-left"});
+}
+
+std::vector<std::string> frame_option_names() {
+  return {"--image-topic", "--eye", "--side-by-side", "--colour-matrix", "--chroma-location", "--fps"};
 }
 
 }  // namespace lapservo::app

@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "apps/lapservo/cli/subcommands.h"
 #include "lapservo/geometry/camera.h"
@@ -41,5 +42,8 @@ void add_eye_options(Command command, FrameOptions& options);
 
 /// Those, --colour-matrix and --chroma-location.
 void add_video_options(Command command, FrameOptions& options);
+
+/// All that say how a recording's frames are read, but for --deinterlace.
+std::vector<std::string> frame_option_names();
 
 }  // namespace lapservo::app

@@ -57,12 +57,14 @@ Board board_of(const BoardWords& words, const BoardWords::Names& names) {
   return board;
 }
 
-BoardRecordings::BoardRecordings(const Board& board, std::size_t most_views, const std::optional<Rig>& rig)
+BoardRecordings::BoardRecordings(const Board& board, std::size_t most_views, const std::optional<Rig>& rig,
+                                 bool deinterlace)
     : views_(board, most_views), whose_("the rig's camera") {
   if (static_cast<std::size_t>(board.columns * board.rows) < BoardViews::least_corners)
     throw InputError("board", "inner corners", fmt::format("{}x{}", board.columns, board.rows),
                      fmt::format("{} or more to calibrate a camera", BoardViews::least_corners));
   if (rig) size_ = cv::Size(rig->camera.width_px, rig->camera.height_px);
+  if (deinterlace || (rig && rig->camera.deinterlace)) field_.emplace(rig ? rig->camera.response : Response{});
 }
 
 void BoardRecordings::look_at(FrameSource& source, const std::string& name, const JobWatch& watch,
@@ -85,8 +87,10 @@ void BoardRecordings::look_at(FrameSource& source, const std::string& name, cons
     ++read_.looked_at;
     // The rest is still read, since it may be damaged, but no view would be taken of it.
     const bool searched = pictures || !views_.full();
-    if (searched && !views_.add(name_of(*frame), frame->bgr, pictures) && pictures)
-      without_board_.push_back(name_of(*frame));
+    if (searched) {
+      const cv::Mat bgr = field_ ? field_->of(frame->bgr).clone() : frame->bgr;
+      if (!views_.add(name_of(*frame), bgr, pictures) && pictures) without_board_.push_back(name_of(*frame));
+    }
     watch.tell(source.frame_count(), read, fmt::format(", {} views", views_.views().size()));
     if (!live) continue;
     const std::string wanted = views_.views().empty() ? "show the board" : advice(views_.views(), *size_);

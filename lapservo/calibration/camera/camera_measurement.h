@@ -9,6 +9,7 @@
 #include "lapservo/calibration/calibrated_number.h"
 #include "lapservo/calibration/camera/camera_calibration.h"
 #include "lapservo/calibration/recording/frame_recording.h"
+#include "lapservo/vision/image/interlacing.h"
 
 namespace lapservo::internal {
 
@@ -31,9 +32,9 @@ Board board_of(const BoardWords& words, const BoardWords::Names& names = {});
 /// or fewer.
 class BoardRecordings {
  public:
-  /// `rig`: its camera took them and gives their size; else the first one does. Throws InputError for a board of fewer
-  /// corners than a view needs.
-  BoardRecordings(const Board& board, std::size_t most_views, const std::optional<Rig>& rig);
+  /// `rig`: its camera took them and gives their size; else the first one does. `deinterlace`: the field of the even
+  /// rows, whatever the rig says. Throws InputError for a board of fewer corners than a view needs.
+  BoardRecordings(const Board& board, std::size_t most_views, const std::optional<Rig>& rig, bool deinterlace = false);
 
   /// Gathers views of a live camera until they suffice; `say` receives advice for the next view. Throws InputError at
   /// an image of another size.
@@ -49,6 +50,7 @@ class BoardRecordings {
 
  private:
   BoardViews views_;
+  std::optional<EvenField> field_;  // where images are interlaced
   std::optional<cv::Size> size_;
   std::string whose_;
   FramesRead read_;

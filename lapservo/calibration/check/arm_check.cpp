@@ -91,21 +91,22 @@ ArmCheck check_arm(const Instrument& instrument, const Camera& camera, const std
                    const std::vector<TrackedPsi>& tracked, const JointRecording& recording, const std::string& source) {
   ArmCheck check;
   const ArmStart start = start_arm(instrument, poses, recording, source);
-  if (!start.refusal.empty()) {
+  const auto refused = [&](const std::string& why) {
     const std::string fault = explaining_fault(instrument, poses, recording, source, nullptr);
-    return check.refusal = fault.empty() ? start.refusal : fault, check;
-  }
+    return check.refusal = fault.empty() ? why : fault, check;
+  };
+  if (!start.refusal.empty()) return refused(start.refusal);
   check.region = ranges_text(*instrument.joints, start.ranges);
   const std::vector<JointFault> focal{focal_fault()};
   const auto full = fit_arm(instrument, start, recording, {true, focal});
-  if (!full) return check.refusal = std::string("the motion leaves the registration open: ") + swing_more, check;
+  if (!full) return refused(std::string("the motion leaves the registration open: ") + swing_more);
   const Eigen::Index first = full->model.blocks().joints.first;  // of the faults that are fitted
   check.focal = {std::abs(full->fit.x[first]), std::sqrt(full->covariance(first, first))};
   check.drift_m = drift_of_place(*full), check.drift_rad = drift_of_directions(*full);
   const ArmFaults there{check.drift_m.exceeds(least_drift_m) || check.drift_rad.exceeds(least_drift_rad),
                         check.focal.exceeds(least_focal) ? focal : std::vector<JointFault>{}};
   const auto best = fit_arm(instrument, start, recording, there);
-  if (!best) return check.refusal = std::string("the motion leaves the registration open: ") + swing_more, check;
+  if (!best) return refused(std::string("the motion leaves the registration open: ") + swing_more);
 
   check.noise_across = best->noise.head<2>().maxCoeff(), check.noise_roll = best->noise[5];
   check.noise = best->noise.maxCoeff();

@@ -30,8 +30,8 @@ constexpr int max_rounds = 16, gap_round = 7;
 constexpr double settled_m = 1e-6;
 // Largest tolerance of a print that may be written: with more, psi is hardly ever known.
 constexpr double max_tolerance_m = 0.1e-3;
-// A gap narrower than this, or than three sigma, is none.
-constexpr double min_gap_m = 0.04e-3, min_gap_sigmas = 3;
+// A gap narrower than least_edge_m, or than three sigma, is none.
+constexpr double min_gap_sigmas = 3;
 
 // Search range of boundaries and the seam about a round's estimate, and the weight of an outlier.
 struct Round {
@@ -337,7 +337,7 @@ MarkerCalibration calibrate_marker(const Rig& rig, std::size_t instrument, std::
     gap_judged = true;
     const double gap_m = fit.marker().gap_rad * nominal.radius_m();
     const double sigma_m = std::sqrt((*last->covariance)(print_numbers - 1, print_numbers - 1)) * nominal.radius_m();
-    if (gap_m >= std::max(min_gap_m, min_gap_sigmas * sigma_m)) continue;
+    if (gap_m >= std::max(least_edge_m, min_gap_sigmas * sigma_m)) continue;
     no_gap_sigma_rad = sigma_m / nominal.radius_m();
     fit.believe_no_gap(), settled = false;
   }

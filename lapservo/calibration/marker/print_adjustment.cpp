@@ -311,6 +311,10 @@ PrintDepartures departures_at(ceres::Problem& problem, const std::vector<ViewMea
   const Departures departures = departures_of(fit, slopes);
   PrintDepartures result;
   result.faults = seen_of(departures, possible);
+  // Clean turns show some of hundredths of a millimetre; the covariance counts them.
+  std::erase_if(result.faults, [](const PrintFault& fault) {
+    return fault.kind == PrintFault::Kind::slips && std::abs(fault.size) < least_edge_m;
+  });
   if (departures.seen.empty()) return result;
   const Eigen::MatrixXd covariance = departures.by_seen + departures.by_instead;
   for (Eigen::Index i = 0; i < print_numbers; ++i)

@@ -9,6 +9,9 @@
 
 namespace lapservo::internal {
 
+/// An edge of a print that lies off by less than this is where it should be: no gap, no slip.
+inline constexpr double least_edge_m = 0.04e-3;
+
 /// A fault that the model of one print with straight edges leaves out.
 struct PrintFault {
   enum class Kind { slips, curved } kind;
@@ -33,7 +36,7 @@ struct Adjustment {
   /// How many times what the measurements say of themselves their scatter is; robust.
   double noise_scale = 1;
   std::optional<PrintCovariance> covariance;  ///< of the print, when requested; counts the faults
-  std::vector<PrintFault> faults;             ///< that show, the clearest first, with the covariance
+  std::vector<PrintFault> faults;  ///< that show and are worth a word, the clearest first, with the covariance
   /// The images look compressed and rotate in one direction: the seam may lag by an unknown amount.
   bool lags = false;
 };

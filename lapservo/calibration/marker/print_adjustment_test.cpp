@@ -1,5 +1,6 @@
 #include "lapservo/calibration/marker/print_adjustment.h"
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -73,6 +74,23 @@ TEST_F(SeamLag, IsTakenOffWhereTheTurnGoesBothWays) {
   const double both_m = by_lag_m(true), one_m = by_lag_m(false);
   EXPECT_GT(one_m, 5e-6) << "the test's own power";
   EXPECT_LT(both_m, 0.15 * one_m);
+}
+
+// That the lower edge lies elsewhere in the second half.
+TEST_F(SeamLag, IsNoSlipAndASmallSlipIsNone) {
+  for (const double slip_m : {0.02e-3, 0.1e-3}) {
+    auto views = passing(seen(), 0, true);
+    for (std::size_t i = 0; i < views.size(); ++i) {
+      views[i].time_s = static_cast<double>(i);
+      for (Measurement& m : views[i].edges.all)
+        if (m.group < 4 && 2 * i >= views.size()) m.residual_px += slip_m * m.turn_fraction * m.along_px_per_m;
+    }
+    const auto faults = adjust(views, rig.instruments[0].marker, {.with_covariance = true})->faults;
+    EXPECT_EQ(std::any_of(faults.begin(), faults.end(),
+                          [](const PrintFault& fault) { return fault.kind == PrintFault::Kind::slips; }),
+              slip_m > least_edge_m)
+        << slip_m;
+  }
 }
 
 // As many one way as there and back.

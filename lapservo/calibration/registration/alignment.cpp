@@ -54,7 +54,11 @@ Alignment align(const Instrument& instrument, const std::vector<TimedPose>& pose
   if (!start.refusal.empty()) return result.refusal = start.refusal, result;
   if (!start.other_delays_s.empty()) return result.refusal = ambiguous_delay(start), result;
   const auto fitted = fit_arm(instrument, start, recording, {false, {clock_fault(start.poses)}});
-  if (!fitted) return result.refusal = std::string("the motion leaves the delay open: ") + swing_more, result;
+  if (!fitted) {
+    const std::string fault = explaining_fault(instrument, with_focal(poses, 0), recording, source, nullptr);
+    return result.refusal = fault.empty() ? std::string("the motion leaves the delay open: ") + swing_more : fault,
+           result;
+  }
   const auto& [model, fit, covariance, noise, faults] = *fitted;
   const Eigen::Index delay = model.blocks().delay.first, clock = model.blocks().joints.first;
   const double first_s = recording.time_s.front(), drift = fit.x[clock];

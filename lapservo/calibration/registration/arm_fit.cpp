@@ -1,7 +1,9 @@
 #include "lapservo/calibration/registration/arm_fit.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <utility>
 
 #include "lapservo/calibration/fit/some_of.h"
@@ -29,6 +31,14 @@ Eigen::MatrixXd arm_covariance(const FrameFit& fit) {
   return covariance_at_least(unmodelled_sigmas * unmodelled_sigmas * fit.covariance, fit.independent);
 }
 
+// A width of half of what the joint travels, or more, is no gap: a width below 0 turns readings about their first one
+// into twice as much, which is another fault.
+bool is_backlash(const std::array<double, 4>& widths, const JointRanges& ranges) {
+  for (std::size_t j = 0; j < 4; ++j)
+    if (2 * std::abs(widths[j]) > ranges.travel(j)) return false;
+  return true;
+}
+
 // Model and fit alone.
 std::optional<ArmFit> fit_model(const Instrument& instrument, const ArmStart& start, const JointRecording& recording,
                                 const ArmFaults& free, const std::vector<JointFault>& held,
@@ -38,7 +48,7 @@ std::optional<ArmFit> fit_model(const Instrument& instrument, const ArmStart& st
   ArmModel model(instrument, start, recording, faults);
   auto fit = fit_frames([&](const Eigen::VectorXd& x) { return model.residuals(x); }, model.unknowns(),
                         2 * poses_per_second(start.poses), at_iteration, held.size());
-  if (!fit) return std::nullopt;
+  if (!fit || !is_backlash(model.backlash_of(fit->x), start.ranges)) return std::nullopt;
   return ArmFit{std::move(model), std::move(*fit), {}, {}, {}};
 }
 
@@ -61,16 +71,22 @@ class Explainer {
         source_(source),
         at_iteration_(at_iteration) {}
 
-  void try_fault(const JointFault& fault, double start_size) {
+  // Whether there is a fit.
+  bool try_fault(const JointFault& fault, double start_size) {
     JointRecording recording = recording_;
     const bool has_size = fault.step > 0;
     if (fault.mend && (!has_size || start_size != 0)) fault.mend(recording, start_size);
+    if (!has_size && recording.joints == recording_.joints) return false;  // they do not have it
     ArmFaults free;
     if (has_size) free.joints.push_back(fault);
     const auto fitted = fit_to(fault.mend ? poses_ : with_focal(poses_, start_size), recording, free);
-    if (!fitted) return;
+    if (!fitted) return false;
     const double more = has_size ? fitted->model.blocks().joints.of(fitted->fit.x)[0] : 0;
-    add(*fitted, fault.text((1 + start_size) * (1 + more) - 1));
+    const double size = (1 + start_size) * (1 + more) - 1;
+    // Nearer to none than to where it started it is none: a joint that stood still moves by no scale.
+    if (std::abs(size) < std::abs(size - start_size)) return false;
+    add(*fitted, fault.text(size));
+    return true;
   }
 
   const std::optional<Explanation>& best() const { return best_; }
@@ -151,7 +167,8 @@ std::string explaining_fault(const Instrument& instrument, const std::vector<Tim
   if (poses.size() < min_registration_poses) return {};
   Explainer explainer(instrument, poses, recording, source, at_iteration);
   for (const JointFault& fault : possible_faults(instrument.joints.value(), poses, fit))
-    for (const double start : fault.starts) explainer.try_fault(fault, start);
+    for (const double start : fault.starts)
+      if (explainer.try_fault(fault, start) && fault.is_linear) break;
   // It explains them when little is left by the images' noise or beside what there was, and much less somewhere.
   constexpr double most_left = 3, most_part_left = 1 / 3.0, least_gain = 1.5;
   const auto& best = explainer.best();

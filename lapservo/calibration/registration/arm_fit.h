@@ -21,7 +21,8 @@ struct ArmFit {
   std::vector<std::string> faults;  ///< of the readings, that show, in words; the clearest first
 };
 
-/// `free`: faults that are fitted beside the registration. Nullopt where the motion leaves a number open.
+/// `free`: faults that are fitted beside the registration. Nullopt where the motion leaves a number open, and where it
+/// takes a backlash of half of a joint's travel.
 std::optional<ArmFit> fit_arm(const Instrument& instrument, const ArmStart& start, const JointRecording& recording,
                               const ArmFaults& free, const AtIteration& at_iteration = {});
 

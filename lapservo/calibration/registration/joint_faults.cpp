@@ -23,6 +23,17 @@ double frame_period_s(const std::vector<TimedPose>& poses) {
   return periods_s.empty() ? 1 : median(periods_s);
 }
 
+// From turns for radians to radians for turns, in steps after which the sign of a joint that turns once still shows.
+std::vector<double> scale_starts() {
+  constexpr int steps = 8, steps_of_two = 3;
+  std::vector<double> starts{0};
+  for (int k = 1; k <= steps; ++k) {
+    const double times = std::exp2(static_cast<double>(k) / steps_of_two);
+    starts.insert(starts.end(), {times - 1, 1 / times - 1});
+  }
+  return starts;
+}
+
 JointFault scale_fault(const std::string& name, std::size_t j) {
   return {[=](double size) {
             return fmt::format(
@@ -32,7 +43,11 @@ JointFault scale_fault(const std::string& name, std::size_t j) {
           [j](JointRecording& r, double size) {
             for (auto& at : r.joints) at[j] *= 1 + size;
           },
-          1e-4};
+          1e-4,
+          0,
+          scale_starts(),
+          0,
+          true};
 }
 
 JointFault coupling_fault(const Joints& joints, std::size_t j, std::size_t by) {

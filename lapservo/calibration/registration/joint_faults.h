@@ -21,6 +21,7 @@ struct JointFault {
   double least = 0;                  ///< smaller ones are not worth a word
   std::vector<double> starts = {0};  ///< from where a fit of its size may have to begin
   double prior = 0;                  ///< Unknown::prior of its size
+  bool is_linear = false;            ///< the readings are in it: the first of the starts that gives a fit suffices
 };
 
 /// Another focal length of the camera than that by which the poses were found.

@@ -223,11 +223,13 @@ Registration register_arm(const Instrument& instrument, const std::vector<TimedP
     return result.refusal = fault.empty() ? start.refusal : misfit_text(fault), result;
   }
   const auto fit = fit_arm(instrument, start, recording, {}, at_iteration);
-  if (!fit)
-    return result.refusal =
-               "the motion leaves the registration open: " + travels_text(start.guess.joints, start.ranges) + ": " +
-               swing_more,
+  if (!fit) {
+    const std::string fault = explained(nullptr);
+    return result.refusal = !fault.empty() ? misfit_text(fault)
+                                           : "the motion leaves the registration open: " +
+                                                 travels_text(start.guess.joints, start.ranges) + ": " + swing_more,
            result;
+  }
   report_arm(*fit, result);
   result.arm->ranges = start.ranges;
   const Largest sigma = largest_sigma(result), off = largest_residual(result);

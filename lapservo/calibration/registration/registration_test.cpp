@@ -10,6 +10,7 @@
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
+#include "lapservo/calibration/recording/joint_recording.h"
 #include "lapservo/calibration/registration/registration_measurement.h"
 #include "lapservo/calibration/registration/test_motion.h"
 #include "lapservo/core/angles.h"
@@ -18,8 +19,10 @@
 #include "lapservo/geometry/rotation.h"
 #include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/rig/joint_conversion.h"
+#include "lapservo/rig/rig_writer.h"
 #include "lapservo/testing/has.h"
 #include "lapservo/testing/input_error.h"
+#include "lapservo/testing/rigs.h"
 #include "lapservo/testing/temporary_folder.h"
 
 namespace lapservo::internal {
@@ -205,6 +208,27 @@ TEST(RegisterArm, RefusesASignThatDoesNotShow) {
   }
 }
 
+// Too far for the signs to show.
+TEST(RegisterArm, NamesTheJointWhoseScaleIsFarOff) {
+  for (const auto& [joint, by] : {std::pair{0, 0.5}, {3, 1 / two_pi}}) {
+    Motion motion;
+    motion.swing[3] = 2.5, motion.seconds = 10;
+    Recorded data = recorded(motion);
+    const auto j = static_cast<std::size_t>(joint);
+    for (auto& at : data.recording.joints) at[j] *= by;
+    EXPECT_TRUE(has(registered_from_names(data).refusal, data.truth.joints->names[j] + " moves by")) << by;
+  }
+}
+
+// A backlash of less than nothing has the instrument move by twice the readings, where these begin in their middle.
+TEST(RegisterArm, TakesNoScaleForABacklash) {
+  Motion motion;
+  motion.seed = 7, motion.seconds = 10;
+  Recorded data = recorded(motion);
+  for (auto& at : data.recording.joints) at[2] *= 0.5;
+  EXPECT_TRUE(has(registered_from_names(data).refusal, "insertion moves by"));
+}
+
 TEST(RegisterArm, RefusesWhatCanNotTell) {
   Motion still;
   still.swing.fill(0.01);
@@ -219,6 +243,19 @@ TEST(RegisterArm, RefusesWhatCanNotTell) {
   EXPECT_TRUE(has(registered_from_names(few).refusal, "found in 0 frames"));
   few.poses.assign(data.poses.begin(), data.poses.begin() + 10);
   EXPECT_TRUE(has(registered_from_names(few).refusal, "found in 10 frames"));
+}
+
+// As far from the configuration as readings are taken.
+TEST(RegisterArm, FindsNoOffsetThatARigMayNotHave) {
+  Motion motion;
+  motion.offset = {0.2, 7.2, 1.05, 0.7};
+  const Recorded data = recorded(motion);
+  Rig rig = testing::paper_test_rig();
+  rig.instruments[0] = registered(data.truth, registered_from_names(data));
+  EXPECT_NO_THROW(check_units(data.recording, *data.truth.joints, "joints.csv", JointsOf::arm));
+  EXPECT_NO_THROW(measured_rig_yaml(rig, "rig.yaml"));
+  rig.instruments[0].image_delay_s = 70;
+  EXPECT_TRUE(has(input_error([&] { measured_rig_yaml(rig, "rig.yaml"); }), "image_delay_s: is 70"));
 }
 
 TEST(JointRecording, IsRefinedSmoothlyAndKeepsItsPauses) {

@@ -300,6 +300,9 @@ TEST(ToolPlace, ByCalliperIsAsKnownAsItsParts) {
   EXPECT_NEAR(tool.place->base_in_marker_m.z(), 0.045, 1e-12);
   EXPECT_NEAR(std::sqrt(tool.place->covariance(2, 2)), std::hypot(1e-4, 5e-5), 1e-12);
   EXPECT_GT(placed_by_calliper(wristed(), marker, 0.02, 1e-4).place->covariance(3, 3), 1);
+  marker.tolerance_m = 5e-4;  // of each end: larger
+  EXPECT_NEAR(std::sqrt(placed_by_calliper({}, marker, 0.02, 1e-4).place->covariance(2, 2)),
+              std::hypot(1e-4, 5e-4, 5e-4), 1e-12);
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #include "lapservo/calibration/tip/tool_place.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -41,13 +42,14 @@ Tool placed_by_tip(Tool tool, const std::vector<double>& wrist_rad, const Eigen:
 
 Tool placed_by_calliper(Tool tool, const Marker& marker, double distance_m, double sigma_m) {
   Tool::Place place = place_before(tool);
-  double variance_m2 = sigma_m * sigma_m;
+  double length_m2 = 0;  // the variance of the marker's: between its ends, or of its bands
   if (marker.sigmas.bands_upper_m)
-    for (const double sigma : *marker.sigmas.bands_upper_m) variance_m2 += sigma * sigma;
+    for (const double sigma : *marker.sigmas.bands_upper_m) length_m2 += sigma * sigma;
+  length_m2 = std::max(length_m2, 2 * marker.tolerance_m * marker.tolerance_m);
   const double across_m2 = off_axis_sigma_m * off_axis_sigma_m;
   place.base_in_marker_m = {0, 0, marker.length_m() + distance_m};
   place.covariance.topRows<3>().setZero(), place.covariance.leftCols<3>().setZero();
-  place.covariance.diagonal().head<3>() << across_m2, across_m2, variance_m2;
+  place.covariance.diagonal().head<3>() << across_m2, across_m2, sigma_m * sigma_m + length_m2;
   tool.place = place;
   return tool;
 }

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cstdio>
 #include <ctime>
 #include <filesystem>
@@ -16,6 +17,7 @@
 #include "apps/lapservo/cli/interrupt.h"
 #include "apps/lapservo/cli/subcommands.h"
 #include "apps/lapservo/commands/calibrate/calibrate_steps.h"
+#include "apps/lapservo/inputs/input_files.h"
 #include "apps/lapservo/inputs/joint_input.h"
 #include "lapservo/core/error.h"
 #include "lapservo/rig/calibration_record.h"
@@ -76,13 +78,17 @@ std::string now_utc() {
   return text;
 }
 
-// Empty: leave the step out.
-std::string asked(const Step& step) {
-  std::fprintf(stderr, "\n%s: %s\n  where is it (a folder, a video, a bag; empty: leave this step out)? ",
-               step.name.c_str(), step.what_to_record.c_str());
+std::string answer_to(const std::string& question) {
+  std::fprintf(stderr, "%s? ", question.c_str());
   std::string answer;
   if (!std::getline(std::cin, answer)) return {};
   return answer;
+}
+
+// Empty: leave the step out.
+std::string asked(const Step& step) {
+  return answer_to(fmt::format("\n{}: {}\n  where is it (a folder, a video, a bag; empty: leave this step out)",
+                               step.name, step.what_to_record));
 }
 
 bool asks(const AllOptions& options) {
@@ -102,8 +108,10 @@ class Guide {
   int run() {
     watch_for_interrupts();
     std::vector<Step> all = steps();
-    if (!asks(options_))
+    if (!asks(options_)) {
       for (const Step& step : all) expect_redone(step);
+      expect_bag(all);
+    }
     for (Step& step : all) {
       const int code = take(step);
       if (code != 0) return code;
@@ -115,6 +123,16 @@ class Guide {
   void expect_redone(const Step& step) const {
     if (step.input->empty() && options_.redo == step.name)
       throw InputError("--redo", fmt::format("{} needs {}: {}", step.name, step.flag, step.what_to_record));
+  }
+
+  // Where topics are given.
+  void expect_bag(const std::vector<Step>& all) const {
+    std::vector<std::string> inputs{options_.joints, options_.judged_joints};
+    for (const Step& step : all) inputs.push_back(*step.input);
+    if (std::any_of(inputs.begin(), inputs.end(), has_topics)) return;
+    for (const auto& [option, topic] :
+         {std::pair{"--image-topic", &options_.image_topic}, {"--joint-topic", &options_.joint_topic}})
+      if (!topic->empty()) throw InputError(option, "is " + *topic + ", which is for bags, and no recording is one");
   }
 
   // An endless input can't be distinguished from a finished one, and the Ctrl-C that ends it would end all steps.
@@ -140,7 +158,7 @@ class Guide {
          {},
          [](const auto& options) { return calibrate_colour({options}); }},
         {"marker", to_record_turn, &o.turn, "--turn", "", {}, calibrate_marker},
-        {"registration", to_record_swing, &o.swing, "--swing", o.joints, {}, calibrate_registration},
+        {"registration", to_record_swing, &o.swing, "--swing", "", {}, calibrate_registration},
         {"check", "another swing, or the same, with a full turn", &o.judged, "--check", o.judged_joints, {}, check}};
   }
 
@@ -179,10 +197,9 @@ class Guide {
                                                                      {"--joint-topic", options.joint_topic}};
     for (const auto& [option, value] : of_frames)
       if (!value.empty()) all.insert(all.end(), {option, value});
-    if (camera) return all;
-    if (!options_.instrument.empty()) all.insert(all.end(), {"--instrument", options_.instrument});
+    if (!camera && !options_.instrument.empty()) all.insert(all.end(), {"--instrument", options_.instrument});
     if (options_.deinterlace) all.push_back("--deinterlace");
-    all.insert(all.end(), {"--fps", fmt::format("{}", options_.fps)});
+    if (!camera) all.insert(all.end(), {"--fps", fmt::format("{}", options_.fps)});
     return all;
   }
 
@@ -191,8 +208,7 @@ class Guide {
     static_cast<FrameOptions&>(options) = options_;
     if (!has_topics(*step.input)) options.image_topic.clear();
     options.input = *step.input, options.rig = options_.rig, options.joints = step.joints;
-    const bool with_joints = step.name == "registration" || step.name == "check";
-    if (with_joints && has_topics(step.joints.empty() ? *step.input : step.joints))
+    if (has_joints(step) && has_topics(step.joints.empty() ? *step.input : step.joints))
       options.joint_topic = options_.joint_topic;
     if (step.name != "check") options.out = options_.rig;
     options.instrument = options_.instrument;
@@ -209,8 +225,23 @@ class Guide {
     return 0;
   }
 
+  static bool has_joints(const Step& step) {
+    return step.name == "registration" || step.name == "check";
+  }
+
+  // Those of the swing are no other recording's.
+  void find_joints(Step& step, bool ask) {
+    if (!has_joints(step) || step.input->empty()) return;
+    if (step.joints.empty() && *step.input == options_.swing) step.joints = options_.joints;
+    if (step.joints.empty() && ask && !has_topics(*step.input))
+      step.joints = answer_to("  and the joints meanwhile (a CSV, a bag; empty: without)");
+    if (step.name == "registration") options_.joints = step.joints;
+  }
+
   int take(Step& step) {
-    if (step.input->empty() && asks(options_)) *step.input = asked(step);
+    const bool ask = step.input->empty() && asks(options_);
+    if (ask) *step.input = asked(step);
+    find_joints(step, ask);
     expect_redone(step);
     const CalibrationStep* done = record_.find(step.name);
     if (step.input->empty()) {
@@ -222,7 +253,9 @@ class Guide {
     if (step.name == "camera" && (options_.board.empty() || !options_.square_mm))
       throw InputError("--boards", "needs --board and --square-mm, for example --board 9x6 --square-mm 5");
     const CalibrationStep now{step.name, command_line(arguments_of(step)), state_of(step), now_utc()};
-    if (done && options_.redo != step.name && done->command == now.command && done->inputs == now.inputs)
+    const std::string page = options_of(step).report;
+    const bool has_page = page.empty() || fs::exists(page);
+    if (done && options_.redo != step.name && done->command == now.command && done->inputs == now.inputs && has_page)
       return tell_done(*done);
     std::printf("\n%s: %s\n", step.name.c_str(), now.command.c_str());
     std::fflush(stdout);
@@ -231,7 +264,8 @@ class Guide {
       record_.add(now), record_.rig = rig_state(options_.rig);
       write_record(record_file_, record_);
     }
-    if (code == 0 && !interrupted()) return 0;
+    const bool has_verdict = step.name == "check" && code == 1;  // which it has said
+    if ((code == 0 || has_verdict) && !interrupted()) return code;
     std::fprintf(stderr, "lapservo: stopped %s %s: the same command goes on from there\n", code == 0 ? "after" : "at",
                  step.name.c_str());
     return 1;
@@ -292,6 +326,7 @@ void expect_replaceable(const fs::path& rig) {
 
 int run_all(AllOptions options) {
   expect_replaceable(options.rig);
+  refuse_other_kind(options.report, ".html");
   load_rig(options.rig);
   if (options.camera.empty() && (options.enable_motion || !options.robot.empty()))
     throw InputError(options.robot.empty() ? "--enable-motion" : "--robot", "needs --camera: both are to be recorded");
@@ -307,7 +342,6 @@ int run_all(AllOptions options) {
   }
   if (options.motion.empty()) options.motion = options.swing.empty() ? options.turn : options.swing;
   if (options.judged.empty()) options.judged = options.swing;
-  if (options.judged_joints.empty() && options.judged == options.swing) options.judged_joints = options.joints;
   return Guide(options).run();
 }
 

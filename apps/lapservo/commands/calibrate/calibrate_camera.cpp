@@ -86,7 +86,7 @@ void write_results(const CalibrateCameraOptions& options, std::optional<Rig> rig
   }
   if (!rig) return;
   rig->camera = camera, rig->camera_file.clear();
-  write_file(options.rig_out(), rig_yaml(*rig, options.rig_out()));
+  write_file(options.rig_out(), measured_rig_yaml(*rig, options.rig_out()));
   std::printf("rig: %s\n", options.rig_out().c_str());
 }
 
@@ -100,7 +100,7 @@ int calibrate_camera(const CalibrateCameraOptions& options) {
   watch_for_interrupts();
 
   const Camera before = rig ? rig->camera : Camera{};
-  BoardRecordings recordings(board, options.views, rig);
+  BoardRecordings recordings(board, options.views, rig, options.deinterlace);
   for (const std::string& input : options.inputs) {
     look_at(input, options, rig ? &rig->camera : nullptr, recordings);
     if (recordings.read().stopped) break;
@@ -129,6 +129,7 @@ void add_calibrate_camera(Command parent, Run& run_later) {
       .required();
   add_image_topic_option(command, options->image_topic);
   add_video_options(command, *options);
+  command.add_flag("--deinterlace", options->deinterlace, "For interlaced video: measure the field of the even rows");
   add_board_options(command, options->board, true);
   command.add_option("--rig", options->rig, "The rig that has this camera: its response is where the search starts");
   command.add_option("--out", options->out,

@@ -94,7 +94,7 @@ JobWatch watched_job() {
 }
 
 int write_rig(AtomicFile& out, const Rig& rig, const std::string& path) {
-  out.stream() << rig_yaml(rig, path);
+  out.stream() << measured_rig_yaml(rig, path);
   out.commit();
   std::printf("rig: %s\n", path.c_str());
   return 0;

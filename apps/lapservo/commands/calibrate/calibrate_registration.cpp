@@ -30,6 +30,10 @@ namespace lapservo::app {
 using namespace internal;
 namespace {
 
+bool is_table(const std::string& input) {
+  return std::filesystem::path(input).extension() == ".csv";
+}
+
 constexpr double wait_s = 15;
 
 void add_dvrk_options(Command command, DvrkOptions& options) {
@@ -160,8 +164,7 @@ int calibrate_registration(const CalibrateOptions& options) {
   const std::size_t index = instrument_meant(rig, options);
   Instrument instrument = rig.instruments[index];
   refuse_outputs_over_inputs(options, rig);
-  const bool is_table = std::filesystem::path(options.input).extension() == ".csv";
-  const auto frames = is_table ? nullptr : open_frames(options.input, options, &rig.camera);
+  const auto frames = is_table(options.input) ? nullptr : open_frames(options.input, options, &rig.camera);
   const auto joints = find_joint_input(options, instrument, frames.get());
   if (joints) instrument.joints = joints->joints;
   AtomicFile out(options.out);
@@ -211,7 +214,12 @@ void add_calibrate_registration(Command parent, Run& run_later) {
       "offset\n"
       "stays the rig's: camera_from_rcm turns with it.\n"
       "Example:\n  lapservo calibrate registration motion.mp4 --joints joints.csv --rig rig.yaml --out rig.yaml");
-  command.runs(run_later, [options] { return calibrate_registration(*options); });
+  command.runs(run_later, [options, command] {
+    std::vector<std::string> of_frames = frame_option_names();
+    of_frames.emplace_back("--deinterlace");
+    if (is_table(options->input)) command.refuse(of_frames, "is of frames, and a CSV of observations has none");
+    return calibrate_registration(*options);
+  });
 }
 
 }  // namespace lapservo::app

@@ -91,9 +91,15 @@ void print(const TipCalibration& calibration) {
     std::printf("azimuth and offsets of the wrist are as they were: --touch with a bent wrist measures them\n");
 }
 
-int calibrate_tip(CalibrateTipOptions options) {
+int calibrate_tip(CalibrateTipOptions options, const Command& command) {
   if (!options.pivot.empty() + !options.touches.empty() + !options.calliper.empty() != 1)
     throw InputError("calibrate tip", "takes one way to measure it, expected --pivot, --touch or --calliper");
+  if (options.touches.empty())
+    command.refuse({"--board", "--square-mm", "--aruco", "--marker-mm"}, "is of a board, expected --touch with it");
+  if (!options.calliper.empty()) {
+    command.refuse(frame_option_names(), "is of images, expected --pivot or --touch with it");
+    command.refuse({"--deinterlace"}, "is of images, expected --pivot or --touch with it");
+  }
   options.input = options.pivot + options.touches;  // the one that is given
   Rig rig = load_rig(options.rig);
   const std::size_t index = instrument_meant(rig, options);
@@ -136,7 +142,7 @@ void add_calibrate_tip(Command parent, Run& run_later) {
       "20 degrees or more to all sides; with --touch, touch 5 corners or more (10 with the wrist bent differently),\n"
       "the shaft tilted and rolled differently.\n"
       "Example:\n  lapservo calibrate tip --pivot pivot.mp4 --rig rig.yaml --out rig.yaml");
-  command.runs(run_later, [options] { return calibrate_tip(*options); });
+  command.runs(run_later, [options, command] { return calibrate_tip(*options, command); });
 }
 
 }  // namespace lapservo::app
