@@ -13,13 +13,18 @@ namespace lapservo::internal {
 // Messages of a CRTK site, independent of the transport. Times are the sender's stamps in seconds; NaN for an invalid
 // stamp.
 
+/// Whether a message may have been said long ago, as a latching publisher of ROS 1 begins every connection with its
+/// last one: `again` where this program had a connection before.
+enum class Latched : std::uint8_t { no, perhaps, again };
+
 /// sensor_msgs/JointState: measured_js, setpoint_js, servo_jp. Efforts are not used.
 struct JointMessage {
   double stamp_s = 0;
   std::vector<std::string> names;
   std::vector<double> positions;     ///< rad, m
   std::vector<double> velocities{};  ///< rad/s, m/s; written, not read
-  std::uint64_t source = 0;          ///< whoever sent it: of what came, a number for each sender
+  std::uint64_t source = 0;          ///< whoever sent it: of what came, a number for each program
+  Latched latched = Latched::no;
 };
 
 /// trajectory_msgs/JointTrajectory. Velocities, accelerations and efforts are not used.
@@ -31,6 +36,8 @@ struct TrajectoryMessage {
   double stamp_s = 0;
   std::vector<std::string> names;
   std::vector<Point> points;
+  std::uint64_t source = 0;  ///< as in JointMessage
+  Latched latched = Latched::no;
 };
 
 /// crtk_msgs/OperatingState.
@@ -46,6 +53,7 @@ struct StringMessage {
   double stamp_s = 0;
   std::string text;
   std::uint64_t source = 0;  ///< as in JointMessage
+  Latched latched = Latched::no;
 };
 
 /// A command of motion, of which only the arrival counts.
@@ -118,6 +126,7 @@ struct PlaceMessage {
   std::string frame;         ///< written, not read
   Rigid3 pose;               ///< frame_from_body
   std::uint64_t source = 0;  ///< as in JointMessage
+  Latched latched = Latched::no;
 };
 
 /// tf2_msgs/TFMessage: /tf.

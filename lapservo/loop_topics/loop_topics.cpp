@@ -15,13 +15,14 @@
 #include "lapservo/io/overlay.h"
 #include "lapservo/io/pictures/jpeg_encoding.h"
 #include "lapservo/rig/single_instrument.h"
-#include "lapservo/robot/steady_clock.h"
+#include "lapservo/robot/supervisor_state.h"
 
 namespace lapservo::internal {
 namespace {
 
 constexpr double between_states_s = 1, between_drawings_s = 0.1;
 // A start is repeated when one came so long before: `ros2 topic pub` says it once a second, about.
+// Messages that a network or a stopped process kept back are usually late by no more.
 constexpr double repeated_s = 1.5;
 constexpr std::size_t most_remarks = 3;  // a tick
 constexpr double never = -std::numeric_limits<double>::infinity();
@@ -110,12 +111,14 @@ TipGoal tip_goal_of(const PlaceMessage& message) {
 LoopTopics::LoopTopics(Transport& transport, const Rig& rig, const FrameNames& frames, bool rcm_moves, bool hears)
     : transport_(transport),
       rig_(rig),
+      interrupted_s_(never),
       observation_(transport.publisher<ObservationMessage>(topic(rig, "observation"))),
       frames_(transport, first_instrument(rig, "rig"), frames, rcm_moves),
       desired_(transport.publisher<JointMessage>(topic(rig, "desired"))),
       error_(transport.publisher<JointMessage>(topic(rig, "error"))),
       diagnostics_(transport.publisher<DiagnosticMessage>("/diagnostics")),
       overlay_(transport.publisher<CompressedImageMessage>(topic(rig, "overlay/compressed"))),
+      begun_s_(-never),
       started_s_{never, never},
       other_loop_s_(never) {
   subscriptions_.push_back(transport.subscribe<JointMessage>(topic(rig, "desired"), [this](JointMessage&&) {
@@ -217,7 +220,9 @@ void LoopTopics::publish_state(const ControlTick& tick, const std::string& state
 void LoopTopics::hear(const StringMessage& command) {
   const std::string words = plain_words(command.text);
   const std::lock_guard lock(mutex_);
-  if (words == "start" || words == "start force") return hear_start(command, words != "start");
+  const bool starts = words == "start" || words == "start force";
+  if (starts && is_of_before(command.latched)) return;
+  if (starts) return hear_start(command, words != "start");
   wishes_.stops.insert(command.source);
   if (words == "stop") return;
   remark(
@@ -226,6 +231,15 @@ void LoopTopics::hear(const StringMessage& command) {
 
 void LoopTopics::remark(const std::string& text) {
   if (wishes_.remarks.size() < most_remarks) wishes_.remarks.insert(text);
+}
+
+bool LoopTopics::is_of_before(Latched latched) {
+  const bool begins = !(clock_.now_s() - begun_s_ > repeated_s);
+  if (latched != Latched::again && (latched == Latched::no || !begins)) return false;
+  remark(
+      "a latched start or goal does not count where the loop has just begun or its sender connects again: say it "
+      "again");
+  return true;
 }
 
 // The last of all goals counts.
@@ -241,6 +255,7 @@ void LoopTopics::hear_goals(const char* name, Goal (*goal_of)(const Message&), s
     }
     const std::lock_guard lock(mutex_);
     if (!goal) return remark(refusal);
+    if (is_of_before(message.latched)) return;
     wishes_.set_point.reset(), wishes_.tip_goal.reset(), wishes_.trajectory.reset();
     wishes_.*wish = std::move(goal);
   };
@@ -263,9 +278,26 @@ bool LoopTopics::name_is_in_use() const {
   return SteadyClock().now_s() - other_loop_s_ < lasts_s;
 }
 
-LoopWishes LoopTopics::wishes() {
+bool LoopTopics::may_be_old(double arm_heard_s) {
+  const double now_s = clock_.now_s();
+  const double heard_s = std::min(arm_heard_s, std::exchange(called_s_, now_s).value_or(now_s));
+  if (suspension_.was_suspended() || now_s - heard_s > SupervisorConfig().max_silence_s) interrupted_s_ = now_s;
+  return now_s - interrupted_s_ <= repeated_s;
+}
+
+LoopWishes LoopTopics::wishes(double arm_heard_s) {
+  const bool old = may_be_old(arm_heard_s);
   const std::lock_guard lock(mutex_);
-  return std::exchange(wishes_, {});
+  begun_s_ = std::min(begun_s_, clock_.now_s());
+  LoopWishes said = std::exchange(wishes_, {});
+  if (!old || (said.starts.empty() && !said.set_point && !said.tip_goal && !said.trajectory)) return said;
+  LoopWishes rest;
+  rest.stops = std::move(said.stops), rest.remarks = std::move(said.remarks);
+  rest.remarks.insert(fmt::format(
+      "a start or goal does not count until {} s after a silence of the arm or a standstill of the loop, since it may "
+      "have been said before: say it again",
+      repeated_s));
+  return rest;
 }
 
 void LoopTopics::draw() {

@@ -16,6 +16,8 @@
 #include "lapservo/crtk/transport.h"
 #include "lapservo/loop_topics/frame_topics.h"
 #include "lapservo/rig/rig.h"
+#include "lapservo/robot/steady_clock.h"
+#include "lapservo/robot/suspension_watch.h"
 #include "lapservo/servo/run.h"
 
 namespace lapservo::internal {
@@ -43,7 +45,8 @@ struct LoopWishes {
 /// (JointState: s_rad, r_px, l_px, d_px), /lapservo/NAME/tip_goal (PoseStamped of the tip in the camera's frame; an
 /// orientation of (0, 0, 0, 1), which messages have where nobody sets it, leaves the roll free) and
 /// /lapservo/NAME/trajectory (JointTrajectory of the four, or of x_m, y_m, z_m and roll_rad or without). A start that
-/// is repeated counts once: it would start the arm by itself after each hold.
+/// is repeated counts once: it would start the arm by itself after each hold. Latched starts and goals do not count,
+/// with a remark, until 1.5 s after the first call of wishes(), nor where their sender was connected before.
 class LoopTopics {
  public:
   /// `rcm_moves`: as in FrameTopics. `hears`: whether it hears anything; else it only publishes.
@@ -54,8 +57,11 @@ class LoopTopics {
   void publish(const ControlTick& tick, const std::string& state);
   /// Whether another loop has published as NAME in the last second: it would obey the same commands.
   bool name_is_in_use() const;
-  /// Messages since the last call. Goals that are none are dropped, with a remark.
-  LoopWishes wishes();
+  /// Messages since the last call, of which every tick has one. Dropped, with a remark, are goals that are none, and
+  /// starts and goals that may have been kept back: until 1.5 s after the arm, which was heard last at `arm_heard_s` on
+  /// SteadyClock, was silent or the calls were apart for more than 0.5 s, or the computer was suspended. A stop counts
+  /// whenever it comes.
+  LoopWishes wishes(double arm_heard_s);
 
  private:
   void publish_numbers(const ControlTick& tick, double stamp_s);
@@ -66,7 +72,9 @@ class LoopTopics {
   void hear_start(const StringMessage& command, bool force);
   template <typename Message, typename Goal>
   void hear_goals(const char* name, Goal (*goal_of)(const Message&), std::optional<Goal> LoopWishes::*wish);
+  bool is_of_before(Latched latched);
   void remark(const std::string& text);
+  bool may_be_old(double arm_heard_s);
   void draw();
 
   struct Drawing {
@@ -80,6 +88,10 @@ class LoopTopics {
   Rig rig_;
   std::string last_state_;
   double next_state_s_ = 0;
+  SteadyClock clock_;
+  SuspensionWatch suspension_{clock_};
+  std::optional<double> called_s_;  // when wishes() was called last
+  double interrupted_s_;            // when it may have been deaf last
   Transport::Publisher<ObservationMessage> observation_;
   FrameTopics frames_;
   Transport::Publisher<JointMessage> desired_, error_;
@@ -88,6 +100,7 @@ class LoopTopics {
 
   mutable std::mutex mutex_;
   LoopWishes wishes_;
+  double begun_s_;                   ///< when wishes() was called first
   std::array<double, 2> started_s_;  ///< when start, and start force, came last
   double other_loop_s_;              ///< when another one of this name published last
   BoundedQueue<Drawing> to_draw_{1};

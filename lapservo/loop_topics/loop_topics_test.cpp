@@ -44,9 +44,14 @@ struct Loop {
     return transport.sent<Message>("/lapservo/PSM1/" + topic);
   }
   template <class Message>
-  LoopWishes hear(const std::string& topic, const Message& message) {
+  LoopWishes hear(const std::string& topic, const Message& message, double arm_silent_s = 0) {
     transport.say("/lapservo/PSM1/" + topic, message);
-    return topics.wishes();
+    return wishes(arm_silent_s);
+  }
+  LoopWishes wishes(double arm_silent_s = 0) { return topics.wishes(SteadyClock().now_s() - arm_silent_s); }
+  void go_on(double duration_s) {
+    for (const double end_s = SteadyClock().now_s() + duration_s; SteadyClock().now_s() < end_s; testing::sleep(0.05))
+      wishes();
   }
 
   const Rig rig = testing::small_test_rig();
@@ -108,7 +113,7 @@ TEST(LoopTopics, HearsCommandsAndDropsWhatMakesNoSense) {
   ASSERT_EQ(forced.starts.size(), 1u);
   EXPECT_TRUE(forced.starts[0].force);
   EXPECT_EQ(forced.starts[0].source, 7u);
-  const LoopWishes none = loop.topics.wishes();
+  const LoopWishes none = loop.wishes();
   EXPECT_TRUE(none.stops.empty() && none.starts.empty());
   const LoopWishes wishes = loop.hear("set_point", JointMessage{0, names, {0.9, 400, 180, 100}});
   ASSERT_TRUE(wishes.set_point);
@@ -148,8 +153,53 @@ TEST(LoopTopics, AStartThatIsRepeatedCountsOnce) {
   }
   EXPECT_EQ(starts, 1u);
   EXPECT_EQ(remarks, 29u);
-  std::this_thread::sleep_for(std::chrono::milliseconds(1600));
+  loop.go_on(1.6);
   EXPECT_EQ(loop.hear("command", StringMessage{0, "start"}).starts.size(), 1u);
+}
+
+// By a process that was stopped, or by the network; a stop counts whenever it comes.
+TEST(LoopTopics, AStartOrAGoalThatMayHaveBeenKeptBackDoesNotCount) {
+  Loop loop;
+  const auto expect = [&](bool counts, const std::string& start, double arm_silent_s) {
+    SCOPED_TRACE(start);
+    loop.transport.say("/lapservo/PSM1/set_point", JointMessage{0, names, {0.9, 400, 180, 100}});
+    loop.transport.say("/lapservo/PSM1/command", StringMessage{0, "stop"});
+    const LoopWishes wishes = loop.hear("command", StringMessage{0, start}, arm_silent_s);
+    EXPECT_EQ(wishes.set_point.has_value(), counts);
+    EXPECT_EQ(wishes.starts.size(), counts ? 1u : 0u);
+    EXPECT_EQ(wishes.stops.size(), 1u);
+  };
+  expect(true, "start", 0.3);  // as a network that is slow
+  expect(false, "start force", 0.6);
+  expect(false, "start force", 0);
+  loop.go_on(1.6);
+  expect(true, "start", 0);
+  testing::sleep(0.6);
+  expect(false, "start force", 0);
+}
+
+// ROS 1 repeats it for each connection, however old it is; a stop counts whenever it comes.
+TEST(LoopTopics, ALatchedStartOrGoalCountsWhereItIsNew) {
+  Loop loop;
+  const auto expect = [&](bool counts, Latched latched) {
+    JointMessage goal{0, names, {0.9, 400, 180, 100}};
+    StringMessage stop{0, "stop"}, start{0, "start"};
+    goal.latched = stop.latched = start.latched = latched;
+    loop.transport.say("/lapservo/PSM1/set_point", goal);
+    loop.transport.say("/lapservo/PSM1/command", stop);
+    const LoopWishes wishes = loop.hear("command", start);
+    EXPECT_EQ(wishes.set_point.has_value(), counts);
+    EXPECT_EQ(wishes.starts.size(), counts ? 1u : 0u);
+    EXPECT_EQ(wishes.stops.size(), 1u);
+    EXPECT_EQ(wishes.remarks.empty(), counts);
+  };
+  expect(false, Latched::perhaps);  // before the loop begins
+  expect(false, Latched::perhaps);
+  expect(true, Latched::no);
+  loop.go_on(1.6);
+  expect(true, Latched::perhaps);
+  loop.go_on(1.6);
+  expect(false, Latched::again);
 }
 
 TEST(LoopTopics, KnowsAnotherLoopOfItsName) {

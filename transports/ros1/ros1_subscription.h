@@ -11,6 +11,7 @@
 #include <optional>
 #include <ros/callback_queue.h>
 #include <ros/ros.h>
+#include <set>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -18,6 +19,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "lapservo/crtk/messages.h"
 #include "transports/ros1/ros1_decoder.h"
 #include "transports/ros1/ros1_messages.h"
 #include "transports/ros1/ros1_node.h"
@@ -63,6 +65,9 @@ inline std::string ros1_types<CommandMessage>() {
 /// The type of a topic that is published by the master's word, when it is another one.
 std::optional<std::string> other_type_on(const std::string& topic, const std::string& type);
 
+/// Where a node's process answers, by the master's word; nullopt where it does not know.
+std::optional<std::string> address_of_node(const std::string& node);
+
 /// A topic with the thread that takes from it, until destroyed.
 template <typename Message>
 class Ros1Subscription {
@@ -91,6 +96,11 @@ class Ros1Subscription {
  private:
   using Event = ros::MessageEvent<Ros1Received<Message>>;  // not const: its own copy, where it is not the only one
 
+  struct Sender {
+    std::uint64_t source;
+    Latched latched = Latched::no;
+  };
+
   void work() {
     constexpr double longest_s = 30;
     for (double moment_s = 1; !ended_; moment_s = std::min(2 * moment_s, longest_s)) {
@@ -104,21 +114,32 @@ class Ros1Subscription {
     if (!event.getConnectionHeaderPtr() || event.getPublisherName() == ros::this_node::getName()) return;
     const auto received = event.getMessage();
     if (auto& message = received->message) {
-      if constexpr (requires { message->source; }) message->source = source_of(event);
+      if constexpr (requires { message->source; }) {
+        const Sender sender = sender_of(event);
+        message->source = sender.source;
+        if constexpr (requires { message->latched; }) message->latched = sender.latched;
+      }
       handler_(std::move(*message));
     } else if (unreadable_++ == 0) {
       std::fprintf(stderr, "ROS: %s: dropping messages of %s that can't be read as %s\n", topic_.c_str(),
                    event.getPublisherName().c_str(), ros1_types<Message>().c_str());
     }
   }
-  // A number for each connection: a node that is started again has its old name.
-  std::uint64_t source_of(const Event& event) {
-    Connection& connection = connections_[event.getPublisherName()];
-    if (connection.header != event.getConnectionHeaderPtr()) {
-      connection.header = event.getConnectionHeaderPtr();
-      ++connection.count;
-    }
-    return std::hash<std::string>()(event.getPublisherName()) + connection.count;
+  // A number for each process, the same on all topics: a node that connects again is known by its address, one that is
+  // started again has its old name and another address. By connections, since two processes of a name may both speak.
+  Sender sender_of(const Event& event) {
+    const auto& connection = event.getConnectionHeaderPtr();
+    const auto known = sources_.find(connection);
+    if (known != sources_.end()) return {known->second};
+    std::erase_if(sources_, [](const auto& one) { return one.first.use_count() == 1; });  // it has ended
+    std::string& address = addresses_[event.getPublisherName()];
+    if (const auto now = node_->answers() ? address_of_node(event.getPublisherName()) : std::nullopt) address = *now;
+    const auto source = std::hash<std::string>()(event.getPublisherName() + " " + address);
+    sources_.emplace(connection, source);
+    const auto latching = connection->find("latching");
+    const bool is_new = heard_.insert(source).second,
+               latches = latching != connection->end() && latching->second == "1";
+    return {source, !latches ? Latched::no : is_new ? Latched::perhaps : Latched::again};
   }
   // A publisher of another type refuses, of which roscpp says nothing.
   void look_for_other_types() {
@@ -138,11 +159,11 @@ class Ros1Subscription {
   std::atomic<bool> ended_ = false;
   bool connected_ = false;  // or the reason was reported
   long unreadable_ = 0, refused_ = 0;
-  struct Connection {
-    boost::shared_ptr<ros::M_string> header;  // kept, so that no other one has its address
-    std::uint64_t count = 0;
-  };
-  std::map<std::string, Connection> connections_;  // of publishers, by their nodes' names; the thread's only
+  // The thread's only: of connections, by their headers, which are kept so that none is taken for another; and where
+  // nodes answer, as the master knew it last.
+  std::map<boost::shared_ptr<ros::M_string>, std::uint64_t> sources_;
+  std::map<std::string, std::string> addresses_;
+  std::set<std::uint64_t> heard_;
   std::thread thread_;
 };
 

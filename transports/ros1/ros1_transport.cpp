@@ -4,12 +4,15 @@
 #include <cstdint>
 #include <map>
 #include <mutex>
+#include <optional>
 #include <ros/callback_queue.h>
 #include <ros/ros.h>
 #include <stdexcept>
+#include <string>
 #include <type_traits>
 #include <utility>
 #include <variant>
+#include <xmlrpcpp/XmlRpcValue.h>
 
 #include "lapservo/core/wall_clock.h"
 #include "transports/ros1/ros1_names.h"
@@ -100,6 +103,15 @@ std::optional<std::string> other_type_on(const std::string& topic, const std::st
   for (const auto& published : topics)
     if (published.name == topic && published.datatype != type && published.datatype != "*") return published.datatype;
   return std::nullopt;
+}
+
+std::optional<std::string> address_of_node(const std::string& node) {
+  XmlRpc::XmlRpcValue request, response, address;
+  request[0] = ros::this_node::getName();
+  request[1] = node;
+  const bool known = ros::master::execute("lookupNode", request, response, address, false) &&
+                     address.getType() == XmlRpc::XmlRpcValue::TypeString;
+  return known ? std::optional<std::string>(static_cast<std::string&>(address)) : std::nullopt;
 }
 
 Ros1Transport::Ros1Transport(const std::string& node_name)

@@ -2,9 +2,13 @@
 
 #include <atomic>
 #include <chrono>
+#include <cstdint>
 #include <memory>
+#include <netinet/in.h>
+#include <ros/master.h>
 #include <set>
 #include <string>
+#include <sys/socket.h>
 #include <thread>
 #include <vector>
 
@@ -36,6 +40,17 @@ TEST(Ros1Master, IsMissedInOneLineWithinTwoSeconds) {
   }
 }
 
+// All of this process but those to the master, as a network loses them.
+void break_connections() {
+  for (int file = 3; file < 1024; ++file) {
+    sockaddr_in peer{};
+    socklen_t size = sizeof peer;
+    if (::getpeername(file, reinterpret_cast<sockaddr*>(&peer), &size) == 0 && peer.sin_family == AF_INET &&
+        ntohs(peer.sin_port) != ros::master::getPort())
+      ::shutdown(file, SHUT_RDWR);
+  }
+}
+
 // A master, this process's node, and another process that says again what it hears.
 class Ros1Wire : public ::testing::Test {
  protected:
@@ -55,6 +70,40 @@ TEST_F(Ros1Wire, CarriesEveryKindOfMessageThereAndBack) {
   const auto say_state = transport_->publisher<OperatingStateMessage>("in/state");
   expect_same(states.get([&] { say_state(sample_state); }), sample_state);
   expect_carries_each_kind(*transport_, "/in/", *transport_, "/out/");
+}
+
+// Else a connection that was lost would make a stranger of an arm, and of who said stop.
+TEST_F(Ros1Wire, ASenderIsAProcessWhateverItsTopicsAndConnections) {
+  TestInbox<OperatingStateMessage> states;
+  TestInbox<JointMessage> joints;
+  const auto state_subscription = transport_->subscribe<OperatingStateMessage>("/out/state", states.handler());
+  const auto joint_subscription = transport_->subscribe<JointMessage>("/out/joints", joints.handler());
+  const auto say = transport_->publisher<JointMessage>("/in/joints");
+  const std::uint64_t source = states.get([] {}).source;
+  EXPECT_EQ(joints.get([&] { say(sample_joints); }).source, source);
+  states.clear();
+  break_connections();
+  EXPECT_EQ(states.get([] {}).source, source);
+  peer_ = nullptr;
+  states.clear();
+  peer_ = peer();
+  EXPECT_NE(states.get([] {}).source, source) << "started again, it is another arm";
+}
+
+TEST_F(Ros1Wire, ALatchedMessageIsNewFromASenderThatIsNew) {
+  TestInbox<StringMessage> latched, others;
+  const auto latched_subscription = transport_->subscribe<StringMessage>("/out/kept", latched.handler());
+  const auto other_subscription = transport_->subscribe<StringMessage>("/out/text", others.handler());
+  const auto ask = transport_->publisher<StringMessage>("/in/text");
+  EXPECT_EQ(others.get([&] { ask(sample_string); }).latched, Latched::no);
+  EXPECT_EQ(latched.get([] {}).latched, Latched::perhaps);
+  latched.clear();
+  break_connections();
+  EXPECT_EQ(latched.get([] {}).latched, Latched::again);
+  peer_ = nullptr;
+  latched.clear();
+  peer_ = peer();
+  EXPECT_EQ(latched.get([] {}).latched, Latched::perhaps);
 }
 
 TEST_F(Ros1Wire, ListsWhatOthersPublish) {

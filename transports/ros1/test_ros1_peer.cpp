@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "transports/ros1/ros1_messages.h"
+#include "transports/ros1/ros1_subscription.h"
 #include "transports/ros1/ros1_transport.h"
 
 namespace {
@@ -90,6 +91,8 @@ int main(int argc, char** argv) {
   subscriptions.push_back(transport.subscribe<BoolMessage>("/in/joy", [&](BoolMessage&& m) { joy({0, {m.value}}); }));
   const auto odd = transport.publisher<ImageMessage>("/out/odd");
   ros::Publisher pretender = ros::NodeHandle().advertise<Pretender>("/out/pretender", 10);
+  const auto kept = ros::NodeHandle().advertise<Ros1Type<StringMessage>>("/out/kept", 1, true);
+  kept.publish(ros1_message(StringMessage{0, "start"}));
   const auto text = transport.publisher<StringMessage>("/out/text");
   subscriptions.push_back(transport.subscribe<StringMessage>("/in/text", [&](StringMessage&& m) {
     if (m.text == "pretend") {

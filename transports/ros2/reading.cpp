@@ -11,6 +11,7 @@ namespace {
 constexpr dds_duration_t patience = DDS_SECS(1);
 
 struct Offer {
+  dds_instance_handle_t participant = 0;      // whose it is
   bool is_reliable = false, is_kept = false;  // kept: for readers that come later
 
   bool meets(Delivery demanded) const {
@@ -26,8 +27,9 @@ std::optional<Offer> offer_of(dds_entity_t reader, dds_instance_handle_t writer)
   dds_durability_kind_t durability = DDS_DURABILITY_VOLATILE;
   dds_qget_reliability(endpoint->qos, &reliability, nullptr);
   dds_qget_durability(endpoint->qos, &durability);
+  const dds_instance_handle_t participant = endpoint->participant_instance_handle;
   dds_builtintopic_free_endpoint(endpoint);
-  return Offer{reliability == DDS_RELIABILITY_RELIABLE, durability >= DDS_DURABILITY_TRANSIENT_LOCAL};
+  return Offer{participant, reliability == DDS_RELIABILITY_RELIABLE, durability >= DDS_DURABILITY_TRANSIENT_LOCAL};
 }
 
 bool has_volatile_publisher(dds_entity_t reader) {
@@ -91,24 +93,25 @@ void Reading::take(std::size_t reader) {
   const int count = dds_take(readers_[reader], samples.data(), infos.data(), at_once, at_once);
   if (count <= 0) return;
   awaited_ = false;
-  for (int i = 0; i < count; ++i)
-    if (infos[i].valid_data && counts(reader, infos[i].publication_handle))
-      taken_(samples[i], infos[i].publication_handle);
+  for (int i = 0; i < count; ++i) {
+    if (!infos[i].valid_data) continue;
+    const Writer& writer = known(reader, infos[i].publication_handle);
+    if (writer.reader == reader) taken_(samples[i], writer.program);
+  }
   dds_return_loan(readers_[reader], samples.data(), count);
 }
 
 // A writer's message reaches every reader whose demand the writer meets, each on its own way. The most demanding of
 // them counts, and for good: they are not in step. Nothing is known of a writer that is gone; then the first one counts
 // that is found to hold a message of it: the more demanding ones, taken from before, held none.
-bool Reading::counts(std::size_t reader, dds_instance_handle_t writer) {
-  const auto known = counting_.find(writer);
-  if (known != counting_.end()) return known->second == reader;
+const Reading::Writer& Reading::known(std::size_t reader, dds_instance_handle_t writer) {
+  const auto one = writers_.find(writer);
+  if (one != writers_.end()) return one->second;
   const auto offer = offer_of(readers_[reader], writer);
   const auto met = std::find_if(deliveries_.begin(), deliveries_.end(),
                                 [&](Delivery delivery) { return offer && offer->meets(delivery); });
-  const std::size_t one = met == deliveries_.end() ? reader : static_cast<std::size_t>(met - deliveries_.begin());
-  counting_.emplace(writer, one);
-  return one == reader;
+  const std::size_t counts = met == deliveries_.end() ? reader : static_cast<std::size_t>(met - deliveries_.begin());
+  return writers_.emplace(writer, Writer{counts, offer ? offer->participant : writer}).first->second;
 }
 
 }  // namespace lapservo::internal

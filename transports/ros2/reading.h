@@ -18,7 +18,9 @@ namespace lapservo::internal {
 /// order in which it wrote them.
 class Reading {
  public:
-  using Taken = std::function<void(const void*, dds_instance_handle_t writer)>;
+  /// `program`: the participant that wrote it, the same on all topics; where its writer is gone by then a number of its
+  /// own.
+  using Taken = std::function<void(const void*, dds_instance_handle_t program)>;
   /// A reader for each delivery, the most demanding first. `depth`: as in DdsNode::create_reader(), for each.
   Reading(std::shared_ptr<DdsNode> node, const std::string& topic, const dds_topic_descriptor_t& type,
           const std::vector<Delivery>& deliveries, std::optional<int> depth, Taken taken);
@@ -27,10 +29,14 @@ class Reading {
   Reading& operator=(const Reading&) = delete;
 
  private:
+  struct Writer {
+    std::size_t reader;  // that counts, of readers_
+    dds_instance_handle_t program;
+  };
   void work();
   void look_for_silent_publisher();
   void take(std::size_t reader);
-  bool counts(std::size_t reader, dds_instance_handle_t writer);
+  const Writer& known(std::size_t reader, dds_instance_handle_t writer);
 
   std::shared_ptr<DdsNode> node_;
   std::string topic_;
@@ -39,8 +45,8 @@ class Reading {
   bool awaited_;  // until the first message of a topic that is latched
   int silences_ = 0;
   dds_entity_t waitset_;
-  std::vector<dds_entity_t> readers_;                      // by deliveries_
-  std::map<dds_instance_handle_t, std::size_t> counting_;  // of each writer, the reader that counts
+  std::vector<dds_entity_t> readers_;  // by deliveries_
+  std::map<dds_instance_handle_t, Writer> writers_;
   std::thread thread_;
 };
 

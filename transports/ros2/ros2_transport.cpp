@@ -73,9 +73,9 @@ Transport::Publisher<Message> made_publisher(const std::shared_ptr<DdsNode>& nod
 template <typename Message>
 Transport::Subscription made_subscription(const std::shared_ptr<DdsNode>& node, const std::string& topic,
                                           const Transport::Handler<Message>& handler) {
-  const auto taken = [handler](const void* wire, dds_instance_handle_t writer) {
+  const auto taken = [handler](const void* wire, dds_instance_handle_t program) {
     Message message = Wire<Message>::read(*static_cast<const typename Wire<Message>::Type*>(wire));
-    if constexpr (requires { message.source; }) message.source = writer;
+    if constexpr (requires { message.source; }) message.source = program;
     handler(std::move(message));
   };
   return std::make_shared<Reading>(node, topic, Wire<Message>::descriptor(), deliveries_of<Message>(),

@@ -77,6 +77,24 @@ TEST(Ros2Transport, KnowsWhoReads) {
   first = second = nullptr;
 }
 
+// So the interlock knows a stranger's state from one of the arm.
+TEST(Ros2Transport, ASenderIsAProgramWhicheverTopicItWrites) {
+  Ros2Transport to("to"), arm("arm"), other("other");
+  TestInbox<JointMessage> joints;
+  TestInbox<OperatingStateMessage> states;
+  const auto joint_subscription = to.subscribe<JointMessage>("/PSM1/measured_js", joints.handler());
+  const auto state_subscription = to.subscribe<OperatingStateMessage>("/PSM1/operating_state", states.handler());
+  const auto say_joints = arm.publisher<JointMessage>("/PSM1/measured_js");
+  const auto say_state = arm.publisher<OperatingStateMessage>("/PSM1/operating_state");
+  const auto say_other = other.publisher<OperatingStateMessage>("/PSM1/operating_state");
+  const std::uint64_t source = joints.get([&] { say_joints(sample_joints); }).source;
+  EXPECT_EQ(states.get([&] { say_state(sample_state); }).source, source);
+  EXPECT_TRUE(testing::wait_for([&] {
+    say_other(sample_state);
+    return states.all().back().source != source;
+  }));
+}
+
 // As another program writes them, empty.
 TEST(Ros2Transport, HearsCommandsOfEachTypeThatDvrkReads) {
   const std::vector<std::pair<CommandType, const dds_topic_descriptor_t*>> commands{

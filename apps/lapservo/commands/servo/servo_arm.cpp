@@ -70,7 +70,7 @@ class ArmWatcher : public RunWatcher {
     if (!std::exchange(two_endoscopes_, two_endoscopes) && two_endoscopes)
       say(time_s, options_.endoscope + ": two programs publish its pose, so it is not known: end one of them");
     topics_.publish(tick, state() == to_string(ControlAction::track) ? "" : state());
-    obey(topics_.wishes(), tick, time_s);
+    obey(topics_.wishes(tick.input.joints.time_s), tick, time_s);
     if (!options_.enable_motion) say_what_would_be_sent(time_s);
     if (topics_.name_is_in_use()) {
       say(time_s, "end: " + name_in_use(run_.rig));
