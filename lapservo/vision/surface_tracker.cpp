@@ -76,7 +76,6 @@ bool SurfaceTracker::remember(const ImageView& image) {
   return blended_s_ && now_s_ - *blended_s_ < two_moments_limits.told_for_s;
 }
 
-// This frame's evidence about the print.
 void SurfaceTracker::learn_print(std::size_t i) {
   const Found& found = found_[i];
   using View = PrintRecord::View;
@@ -87,7 +86,6 @@ void SurfaceTracker::learn_print(std::size_t i) {
     prints_[i].add(*tau_rad, off ? View::off : shows_the_rigs_print(*found.fit) ? View::the_rigs : View::possible);
 }
 
-// To `others_`.
 void SurfaceTracker::cover(std::size_t i, const ShaftPose& pose, WorkBudget& budget) {
   if (!covers_[i].drawn()) {
     budget.spend(search_costs.cover);
@@ -140,17 +138,6 @@ Found SurfaceTracker::follow_known(const ImageView& image, const LightImage& lig
   return found;
 }
 
-Found SurfaceTracker::look_for(const ImageView& image, const LightImage& light, const std::vector<Blob>& blobs,
-                               std::size_t i, WorkBudget& budget) {
-  const auto look = [&](const std::vector<Blob>& where) {
-    return searches_[i].look({scene_of(image, i), light, where}, budget);
-  };
-  if (others_.empty()) return look(blobs);
-  Found found = look(without(blobs, others_));
-  found.among_others = found.fit.has_value();
-  return found;
-}
-
 // Whether some were found.
 bool SurfaceTracker::look_for_lost(const ImageView& image, const LightImage& light, const std::vector<Blob>& blobs,
                                    WorkBudget& budget, bool again) {
@@ -167,7 +154,11 @@ bool SurfaceTracker::look_for_lost(const ImageView& image, const LightImage& lig
     // Who was followed in vain, or took twice the work for it, has all of the next frame.
     const auto beyond = followed_twice_ || followed_in_vain_ ? WorkBudget::Beyond::none : WorkBudget::Beyond::first;
     const double units = budget.left() / static_cast<double>(lost--) * (others_.empty() ? 1 : search_costs.part_beside);
-    found_[i] = budget.share(units, beyond, [&](WorkBudget& part) { return look_for(image, light, blobs, i, part); });
+    const std::vector<Blob> parts = others_.empty() ? std::vector<Blob>() : without(blobs, others_);
+    found_[i] = budget.share(units, beyond, [&](WorkBudget& part) {
+      return searches_[i].look({scene_of(image, i), light, others_.empty() ? blobs : parts}, part);
+    });
+    found_[i].among_others = found_[i].fit && !others_.empty();
     any |= found_[i].fit.has_value();
   }
   return any;

@@ -45,8 +45,6 @@ class SurfaceTracker {
   Found follow_known(const ImageView& image, const LightImage& light, std::size_t instrument, WorkBudget& budget);
   bool look_for_lost(const ImageView& image, const LightImage& light, const std::vector<Blob>& blobs,
                      WorkBudget& budget, bool again);
-  Found look_for(const ImageView& image, const LightImage& light, const std::vector<Blob>& blobs,
-                 std::size_t instrument, WorkBudget& budget);
   bool cover_expected(std::size_t instrument, WorkBudget& budget);
   void cover_found(std::size_t instrument, const std::vector<Blob>& blobs, WorkBudget& budget);
   void cover(std::size_t instrument, const ShaftPose& pose, WorkBudget& budget);

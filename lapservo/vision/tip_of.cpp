@@ -3,13 +3,6 @@
 #include "lapservo/vision/observation.h"
 
 namespace lapservo {
-namespace {
-
-double position_sigma_m(const TipInMarker::Covariance& covariance) {
-  return std::sqrt(covariance.topLeftCorner<3, 3>().trace());
-}
-
-}  // namespace
 
 std::optional<Observation::Tip> tip_of(const Observation& seen, const Tool& tool, std::span<const double> wrist_rad) {
   const bool is_read = tool.wrist.empty() || !wrist_rad.empty();
@@ -17,6 +10,9 @@ std::optional<Observation::Tip> tip_of(const Observation& seen, const Tool& tool
   const TipInMarker tip = tip_in_marker(tool, wrist_rad);
   const Rigid3& camera_from_marker = seen.marker->camera_from_marker;
   const TipInMarker exact{tip.marker_from_tip};
+  const auto position_sigma_m = [](const TipInMarker::Covariance& covariance) {
+    return std::sqrt(covariance.topLeftCorner<3, 3>().trace());
+  };
   Observation::Tip result;
   result.camera_from_tip = camera_from_marker * tip.marker_from_tip;
   result.covariance = tip_covariance_in_camera(camera_from_marker, seen.marker->covariance, tip);

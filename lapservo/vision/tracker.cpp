@@ -1,6 +1,5 @@
 #include "lapservo/vision/tracker.h"
 
-#include <cstddef>
 #include <string>
 
 #include "lapservo/core/error.h"
@@ -117,12 +116,8 @@ Tracker& Tracker::operator=(Tracker&&) noexcept = default;
 
 const std::vector<Observation>& Tracker::track(const cv::Mat& image_bgr, std::optional<double> time_s) & {
   check_image(image_bgr, state_->rig.camera);
-  if (state_->deinterlace) {
-    state_->observe(state_->even_field.of(image_bgr), time_s);
-  } else {
-    state_->observe(image_bgr, time_s);
-    state_->refuse_combed(image_bgr);
-  }
+  state_->observe(state_->deinterlace ? state_->even_field.of(image_bgr) : image_bgr, time_s);
+  if (!state_->deinterlace) state_->refuse_combed(image_bgr);
   state_->name_observations();
   state_->add_tips();
   return state_->observations;

@@ -185,8 +185,9 @@ ViewMeasurements ViewMeasurer::measure(const MarkerView& view, const Marker& mar
   };
   measured.edges = edges_in(scene, light);
   if (reach.ask_processing)
-    measured.processing = find_processing(light, measured.edges.all, sighting.blur.boundaries_px(),
-                                          reach.only_video ? expected_video : expected_picture);
+    measured.processing =
+        find_processing(light, measured.edges.all, glance_at(light, measured.edges.all), sighting.blur.boundaries_px(),
+                        reach.only_video ? expected_video : expected_picture);
   const auto& found = measured.processing.edges;
   const auto processing = found ? std::optional(found->processing) : std::nullopt;
   const auto seam_by = [&](const LightImage* grey) {

@@ -1,9 +1,7 @@
 #include "lapservo/vision/camera/camera_departure.h"
 
 #include <algorithm>
-#include <cmath>
-#include <cstddef>
-#include <span>
+#include <functional>
 
 #include <Eigen/LU>
 
@@ -14,12 +12,6 @@ namespace {
 
 constexpr const DepartureLimits& believed = departure_limits;
 constexpr Look in_light{24, 1, Between::light};
-
-LightTable raised(const LightTable& light_of_value, double exponent) {
-  LightTable out;
-  for (std::size_t i = 0; i < out.size(); ++i) out[i] = std::pow(light_of_value[i], static_cast<float>(exponent));
-  return out;
-}
 
 // A step at the samples of an edge, about its mean; and its density, which moves it, apart from step and mean.
 struct StepColumns {
@@ -208,17 +200,6 @@ SeenBoundaries seen_in(const ChannelGeometry& channels, const PooledEdges& edges
   return seen;
 }
 
-// The same for values between two pixels: along straight lines, too.
-float light_between(const LightTable& light_of_value, float value) {
-  const float place = std::clamp(255 * value, 0.0F, 254.99F);
-  const auto i = static_cast<std::size_t>(place);
-  return light_of_value[i] + (place - static_cast<float>(i)) * (light_of_value[i + 1] - light_of_value[i]);
-}
-
-float as_it_is(float light) {
-  return light;
-}
-
 void differ_by_exponent(double blur_px, SeenBoundaries& seen) {
   const auto blur = static_cast<float>(blur_px);
   const auto raised = [](float light) { return std::pow(light, 1 + believed.exponent_step); };
@@ -273,21 +254,28 @@ std::optional<CameraDeparture> CameraDeparture::then(const CameraDeparture& more
 }
 
 DepartedLight::DepartedLight(const LightImage& light, const CameraDeparture& departure) : light_(light) {
-  if (departure.aberration != ChromaticAberration{}) light_ = light_.magnified(departure.aberration);
-  if (departure.exponent == 1) return;
-  light_of_value_ = raised(light.light_of_value(), departure.exponent);
-  light_ = LightImage(light.image(), light_of_value_, light_.channels());
+  ChannelGeometry channels = light.channels();
+  if (departure.aberration != ChromaticAberration{}) channels.magnify(departure.aberration);
+  const bool is_raised = departure.exponent != 1;
+  for (std::size_t i = 0; is_raised && i < light_of_value_.size(); ++i)
+    light_of_value_[i] = std::pow(light.light_of_value()[i], static_cast<float>(departure.exponent));
+  light_ = LightImage(light.image(), is_raised ? light_of_value_ : light.light_of_value(), channels);
 }
 
 std::optional<CameraDeparture> find_departure(const LightImage& light, std::span<const Measurement> measurements,
                                               const PooledEdges& glance, double blur_px) {
   const ChannelGeometry& channels = light.channels();
   if (!(channels.corner_px > 0)) return std::nullopt;  // of a frame whose middle nobody gave
-  const auto light_of = [&](float value) { return light_between(light.light_of_value(), value); };
+  // For a value between two pixels: along straight lines.
+  const auto light_of = [&table = light.light_of_value()](float value) {
+    const float place = std::clamp(255 * value, 0.0F, 254.99F);
+    const auto i = static_cast<std::size_t>(place);
+    return table[i] + (place - static_cast<float>(i)) * (table[i + 1] - table[i]);
+  };
   if (!Disagreement(seen_in(channels, glance, blur_px, light_of)).is_plain()) return std::nullopt;
   // Means of values have dark edges, which look like another response.
   const PooledEdges edges = pool_edges(light, measurements, in_light);
-  SeenBoundaries seen = seen_in(channels, edges, blur_px, as_it_is);
+  SeenBoundaries seen = seen_in(channels, edges, blur_px, std::identity());
   const Disagreement all(seen);
   if (!all.is_plain()) return std::nullopt;
   differ_by_exponent(blur_px, seen);
@@ -305,7 +293,7 @@ std::optional<CameraDeparture> find_departure(const LightImage& light, std::span
 std::array<double, 4> moved_by_exponent_px(const LightImage& light, std::span<const Measurement> measurements,
                                            double blur_px) {
   const PooledEdges edges = pool_edges(light, measurements, in_light);
-  SeenBoundaries seen = seen_in(light.channels(), edges, blur_px, as_it_is);
+  SeenBoundaries seen = seen_in(light.channels(), edges, blur_px, std::identity());
   differ_by_exponent(blur_px, seen);
   std::array<double, 4> moved_px{};
   for (const SeenBoundary& boundary : seen)

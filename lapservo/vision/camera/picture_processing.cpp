@@ -38,10 +38,6 @@ ProcessingVector expected_sigmas(bool only_video) {
 // How far subsampled chroma lies beside its place where a reader takes it for sited elsewhere, or repeats it: half a
 // pixel in either direction of the image [px, one sigma along a normal].
 constexpr double chroma_beside_px = 0.3;
-ProcessingVector sigmas_beside(ProcessingVector sigmas) {
-  sigmas[at(ProcessingUnknown::chroma_shift_px)] = chroma_beside_px;
-  return sigmas;
-}
 // The mean of what a shift is where one is fitted. Chroma in its place and chroma beside it are taken for equally
 // likely: nobody has counted readers.
 double likely_shift_px(double fitted_px) {
@@ -54,7 +50,8 @@ double likely_shift_px(double fitted_px) {
 }
 ProcessingVector sigmas_of_none() {
   ProcessingVector sigmas = ProcessingVector::Constant(1e-4);
-  sigmas[at(ProcessingUnknown::log_blur)] = 0.3;
+  const int log_blur = at(ProcessingUnknown::log_blur);
+  sigmas[log_blur] = expected_sigmas(false)[log_blur];
   return sigmas;
 }
 // Clipped values hide their plateau, so that these are wide.
@@ -65,12 +62,12 @@ EdgeVector edge_sigmas(const ExpectedPicture& picture) {
 }
 
 State expected_state(std::span<const PooledEdge> edges, double blur_px, double chroma_shift_px) {
-  constexpr double sharp_px = 1.1, radius_px = 1.2;
+  constexpr double sharp_px = 1.1;
   State state;
   state.processing.setZero();
   state.processing[at(ProcessingUnknown::log_blur)] = std::log(std::min(blur_px, sharp_px));
   state.processing[at(ProcessingUnknown::saturation)] = 1;
-  state.processing[at(ProcessingUnknown::log_radius)] = std::log(radius_px);
+  state.processing[at(ProcessingUnknown::log_radius)] = std::log(PictureProcessing{}.sharpening_px);
   state.processing[at(ProcessingUnknown::chroma_shift_px)] = chroma_shift_px;
   for (std::size_t k = 0; k < edges.size(); ++k) {
     state.edges[k].setZero();
@@ -162,7 +159,6 @@ class Problem {
     for (std::size_t k = 0; k < edges_.size(); ++k)
       if (edges_[k].is_seen()) equations_of(k, model_.linearised(filters, processing, state.edges[k]), equations[k]);
   }
-  // `equations`: the state's.
   State improved(const State& state, const AllEdgeEquations& equations, double damping) const {
     std::array<Block, most_edges> blocks;
     State next = state;
@@ -262,15 +258,10 @@ bool is_enough(std::span<const PooledEdge> edges) {
   return std::count(seen.begin(), seen.end(), true) >= processing_limits.min_boundaries;
 }
 
-bool clips(const EdgeVector& edge) {
-  const auto colours = edge.segment<6>(edge_before);
-  return colours.minCoeff() < 0 || colours.maxCoeff() > 1;
-}
-
 // Levenberg and Marquardt's way.
 State minimised(const Problem& problem, State state) {
   constexpr int max_steps = 15;
-  constexpr double settled = 0.005;  // of the cost
+  constexpr double settled = 0.005, damping_step = 10;  // of the cost; a factor
   AllEdgeEquations equations;
   bool is_new = true;
   double cost = problem.cost(state), damping = 1e-3;
@@ -279,11 +270,11 @@ State minimised(const Problem& problem, State state) {
     const State next = problem.improved(state, equations, damping);
     const double next_cost = problem.cost(next);
     if (!(next_cost < cost)) {
-      damping *= 10;
+      damping *= damping_step;
       continue;
     }
     const bool small = next_cost > (1 - settled) * cost;
-    state = next, cost = next_cost, damping /= 10, is_new = true;
+    state = next, cost = next_cost, damping /= damping_step, is_new = true;
     if (small) break;
   }
   return state;
@@ -322,8 +313,9 @@ std::optional<ProcessedEdges> explain(const LightTable& light_of_value, const Po
   // From where the image is expected to be, the way to the least cost may end beside it.
   if (problem.cost(none) < problem.cost(state)) state = minimised(problem, none);
   if (processing_of(state.processing).chroma_variance_px2 > processing_limits.chroma_variance_px2) {
-    const Problem beside(light_of_value, all, blur_px, sigmas_beside(sigmas), expected);
-    const State anywhere = minimised(beside, state);
+    ProcessingVector sigmas_beside = sigmas;
+    sigmas_beside[at(ProcessingUnknown::chroma_shift_px)] = chroma_beside_px;
+    const State anywhere = minimised(Problem(light_of_value, all, blur_px, sigmas_beside, expected), state);
     const double shift_px = likely_shift_px(processing_of(anywhere.processing).chroma_shift_px);
     state = minimised(Problem(light_of_value, all, blur_px, sigmas, expected, shift_px), anywhere);
   }
@@ -337,7 +329,8 @@ std::optional<ProcessedEdges> explain(const LightTable& light_of_value, const Po
     if (!all[k].is_seen()) continue;
     places[all[k].boundary] += all[k].places;
     sum_px[all[k].boundary] += all[k].places * bias_px(k);
-    out.clips = out.clips || clips(state.edges[k]);
+    const auto colours = state.edges[k].segment<6>(edge_before);
+    out.clips = out.clips || colours.minCoeff() < 0 || colours.maxCoeff() > 1;
   }
   for (std::size_t k = 0; k < 4; ++k)
     if (places[k] > 0) out.bias_px[k] = sum_px[k] / places[k];
@@ -363,15 +356,10 @@ PooledEdges glance_at(const LightImage& light, std::span<const Measurement> meas
   return pool_edges(light, measurements, glance);
 }
 
-ProcessingEvidence find_processing(const LightImage& light, std::span<const Measurement> measurements, double blur_px,
-                                   const ExpectedPicture& expected) {
-  if (blur_px > processing_limits.max_blur_px) return {};
-  return find_processing(light, measurements, glance_at(light, measurements), blur_px, expected);
-}
-
 ProcessingEvidence find_processing(const LightImage& light, std::span<const Measurement> measurements,
                                    const PooledEdges& glance, double blur_px, const ExpectedPicture& expected) {
   constexpr Look look{EdgeMeasurements::max_lines, max_brightness_levels, Between::values_cubic};
+  if (blur_px > processing_limits.max_blur_px) return {};
   const auto& light_of_value = light.light_of_value();
   const auto guess = first_guess(light_of_value, glance, blur_px);
   if (!guess) return {};

@@ -9,7 +9,6 @@
 namespace lapservo::internal {
 namespace {
 
-// One place of a boundary.
 struct EdgePlace {
   std::array<std::array<float, PooledEdge::samples>, 3> value;
   float brightness = 0;
@@ -21,8 +20,10 @@ using EdgePlaces = InplaceVector<EdgePlace, EdgeMeasurements::max_lines>;
 
 // Weights of four pixels in a row for a place a fraction of a pixel beyond the second: cubic convolution (Keys, 1981).
 std::array<float, 4> cubic_weights(float f) {
+  constexpr float a = -0.5F;
   const float g = 1 - f;
-  return {-0.5F * f * g * g, 1 + f * f * (1.5F * f - 2.5F), 1 + g * g * (1.5F * g - 2.5F), -0.5F * g * f * f};
+  const auto inner = [](float x) { return 1 + x * x * ((a + 2) * x - (a + 3)); };
+  return {a * f * g * g, inner(f), inner(g), a * g * f * f};
 }
 
 // Encoded values of some channels at a place: as linear as the filters that cameras apply to them.
@@ -59,14 +60,13 @@ void sample_at(const ImageView& image, float u, float v, Between between, std::s
                                    : sample_linear<First, Last>(image, u, v, sample, place);
 }
 
-void sample_light(const LightImage& light, const Eigen::Vector2f& at, std::size_t sample, EdgePlace& place) {
-  const LightImage::Sample seen = light.at(at.x(), at.y());
-  for (std::size_t c = 0; c < 3; ++c) place.value[c][sample] = 255 * seen.light[c];
-}
-
 void sample_at(const LightImage& light, const Eigen::Vector2f& at, Between between, std::size_t sample,
                EdgePlace& place) {
-  if (between == Between::light) return sample_light(light, at, sample, place);
+  if (between == Between::light) {
+    const LightImage::Sample seen = light.at(at.x(), at.y());
+    for (std::size_t c = 0; c < 3; ++c) place.value[c][sample] = 255 * seen.light[c];
+    return;
+  }
   const ImageView& image = light.image();
   const ChannelGeometry& geometry = light.channels();
   if (!geometry.differs()) return sample_at<0, 3>(image, at.x(), at.y(), between, sample, place);

@@ -119,13 +119,13 @@ class Encoding {
   };
   At light(double value) const {
     const float place = 255 * static_cast<float>(std::clamp(value, 0.0, 1.0));
-    const std::size_t i = std::min<std::size_t>(254, static_cast<std::size_t>(place));
+    const std::size_t i = std::min(light_.size() - 2, static_cast<std::size_t>(place));
     const float step = light_[i + 1] - light_[i];
     return {light_[i] + (place - static_cast<float>(i)) * step, 255 * step};
   }
   // `near`: an index to look from, which stays near the last light's.
   At value(float light, std::size_t& near) const {
-    while (near < 254 && light_[near + 1] < light) ++near;
+    while (near < light_.size() - 2 && light_[near + 1] < light) ++near;
     while (near > 0 && light_[near] > light) --near;
     const float step = light_[near + 1] - light_[near];
     const float fraction = std::clamp((light - light_[near]) / step, 0.0F, 1.0F);
@@ -142,7 +142,6 @@ struct Encoded {
          by_after = OnGrid::Zero(), by_gradient = OnGrid::Zero();
 };
 
-// Nothing but the values.
 struct EncodedValues {
   OnGrid value = OnGrid::Zero();
 };

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstring>
+#include <functional>
 #include <iterator>
 #include <span>
 #include <utility>
@@ -104,12 +105,9 @@ struct Box {
 };
 
 Box box_about(const Blob& blob) {
-  Box box{blob.samples[0].u, blob.samples[0].u, blob.samples[0].v, blob.samples[0].v};
-  for (const Blob::Sample& s : blob.samples) {
-    box.left = std::min(box.left, s.u), box.right = std::max(box.right, s.u);
-    box.top = std::min(box.top, s.v), box.bottom = std::max(box.bottom, s.v);
-  }
-  return box;
+  const auto [left, right] = std::ranges::minmax(blob.samples, {}, &Blob::Sample::u);
+  const auto [top, bottom] = std::ranges::minmax(blob.samples, {}, &Blob::Sample::v);
+  return {left.u, right.u, top.v, bottom.v};
 }
 
 bool lie_near(const Box& a, const Box& b) {
@@ -122,9 +120,7 @@ bool lie_near(const Box& a, const Box& b) {
 // A marker does, unless all but one of its bands are hidden.
 bool shows_two_colours(const Blob& blob) {
   constexpr std::ptrdiff_t least = 2;
-  const std::uint8_t first = blob.samples[0].colour;
-  const auto same =
-      std::count_if(blob.samples.begin(), blob.samples.end(), [&](const Blob::Sample& s) { return s.colour == first; });
+  const auto same = std::ranges::count(blob.samples, blob.samples[0].colour, &Blob::Sample::colour);
   return same >= least && std::ssize(blob.samples) - same >= least;
 }
 
@@ -141,8 +137,7 @@ std::vector<Blob> find_blobs(const ImageView& image, const ColourClasses& classe
     blob.grid_px = grid_px;
     if (static_cast<int>(blob.samples.size()) >= min_samples) blobs.push_back(std::move(blob));
   }
-  std::sort(blobs.begin(), blobs.end(),
-            [](const Blob& a, const Blob& b) { return a.samples.size() > b.samples.size(); });
+  std::ranges::sort(blobs, std::greater{}, [](const Blob& blob) { return blob.samples.size(); });
   return blobs;
 }
 

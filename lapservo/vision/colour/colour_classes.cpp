@@ -1,7 +1,6 @@
 #include "lapservo/vision/colour/colour_classes.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "lapservo/core/angles.h"
 
@@ -10,9 +9,10 @@ namespace lapservo::internal {
 std::optional<double> hue_deg_of(double b, double g, double r) {
   const double highest = std::max({b, g, r}), chroma = highest - std::min({b, g, r});
   if (chroma < colour_limits.min_chroma || chroma < colour_limits.min_saturation * highest) return std::nullopt;
-  if (highest == r) return 60 * (g - b) / chroma;
-  if (highest == g) return 120 + 60 * (b - r) / chroma;
-  return 240 + 60 * (r - g) / chroma;
+  constexpr double sixth_deg = 60;  // of the turn
+  if (highest == r) return sixth_deg * (g - b) / chroma;
+  if (highest == g) return 2 * sixth_deg + sixth_deg * (b - r) / chroma;
+  return 4 * sixth_deg + sixth_deg * (r - g) / chroma;
 }
 
 ColourClasses::ColourClasses(const std::vector<Instrument>& instruments) : bands_(instruments.size()) {

@@ -14,7 +14,7 @@ constexpr const DisplacedLimits& limits = displaced_limits;
 using Residuals = InplaceVector<double, EdgeMeasurements::max_lines>;
 
 bool is_doubtful(const FineFit& fit, std::size_t boundary) {
-  return fit.used[boundary] < limits.located * fit.lines;
+  return fit.used[boundary] < fine_fit_limits.well_seen_fraction * fit.lines;
 }
 
 // The largest number of residuals that lie about one of them.
@@ -27,19 +27,14 @@ int most_alike(const Residuals& residuals_px) {
   return static_cast<int>(most);
 }
 
-// How far from the fit a point is still the boundary's. `bias_px`: by how much the camera's processing may have moved
-// it.
-double reach_px(const Measurement& m, double bias_px, double tolerance_m) {
-  const double sigma_px = std::hypot(m.sigma_px, tolerance_m * m.along_px_per_m);
-  return bias_px + std::max(limits.agreeing_px, limits.agreeing_sigmas * sigma_px);
-}
-
+// `bias_px`: by how much the camera's processing may have moved it.
 bool shows_elsewhere(const EdgeMeasurements& edges, std::size_t boundary, double bias_px, double tolerance_m) {
   Residuals elsewhere_px;
   int agreeing = 0;
   for (const Measurement& m : edges.all) {
     if (m.group != boundary) continue;
-    if (std::abs(m.residual_px) < reach_px(m, bias_px, tolerance_m))
+    const double sigma_px = std::hypot(m.sigma_px, tolerance_m * m.along_px_per_m);
+    if (std::abs(m.residual_px) < bias_px + std::max(limits.agreeing_px, limits.agreeing_sigmas * sigma_px))
       ++agreeing;
     else if (m.sigma_px < limits.max_sigma_px)
       elsewhere_px.push_back(m.residual_px);

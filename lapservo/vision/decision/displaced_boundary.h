@@ -8,7 +8,6 @@ namespace lapservo::internal {
 
 /// When an inner boundary shows elsewhere than a fit has it.
 struct DisplacedLimits {
-  double located = 0.7;                           ///< of the lines: on as many the fit has what shows
   double agreeing_px = 0.5, agreeing_sigmas = 4;  ///< at most so far from the fit, a point agrees with it
   double max_sigma_px = 0.5, alike_px = 0.4;      ///< of points that show it elsewhere, together
   int min_lines = 3;                              ///< that show it there

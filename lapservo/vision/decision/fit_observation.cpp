@@ -12,14 +12,9 @@
 namespace lapservo::internal {
 namespace {
 
-// How sure the fit is of what the centre line shows.
-struct LineSigma {
-  double tau_rad = 0;
-  EdgesCovariance edges_px2;
-};
-
-// To first order, by differences: gamma moves with the pose, psi is its last unknown.
-LineSigma sigma_of(const CentreLine& line, const Scene& scene, const FineFit& fit) {
+// The centre line's numbers, and how sure the fit is of them. To first order, by differences: gamma moves with the
+// pose, psi is its last unknown.
+Observation observed_line(const CentreLine& line, const Scene& scene, const FineFit& fit) {
   PoseVector tau = PoseVector::Zero();
   Eigen::Matrix<double, 8, pose_unknowns> edges = Eigen::Matrix<double, 8, pose_unknowns>::Zero();
   const auto after = [&](int unknown, double step) {
@@ -36,10 +31,13 @@ LineSigma sigma_of(const CentreLine& line, const Scene& scene, const FineFit& fi
     for (std::size_t k = 0; k < 4; ++k)
       edges.block<2, 1>(2 * static_cast<Eigen::Index>(k), i) = (moved->ideal_px[k] - line.ideal_px[k]) / step;
   }
-  LineSigma sigma;
-  sigma.tau_rad = std::sqrt(tau.dot(fit.covariance * tau));
-  sigma.edges_px2 = edges * fit.covariance * edges.transpose();
-  return sigma;
+  Observation observation;
+  observation.tau_rad = line.tau_rad;
+  observation.sigma_tau_rad = std::sqrt(tau.dot(fit.covariance * tau));
+  observation.edges_ideal_px = line.ideal_px;
+  observation.edges_covariance_px2 = edges * fit.covariance * edges.transpose();
+  for (std::size_t k = 0; k < 4; ++k) observation.edges_raw_px[k] = scene.camera.raw_from_ideal(line.ideal_px[k]);
+  return observation;
 }
 
 // A registration that the shaft misses, known only to the distance and the angle by which it does. Nullopt where that
@@ -51,9 +49,8 @@ std::optional<RcmPrior> doubted(const RcmPrior& registration, const ShaftPose& p
   const double missed_m = to_rcm.cross(axis).norm(), missed_rad = std::atan2(missed_m, -to_rcm.dot(axis));
   if (!(missed_rad < most_rad)) return std::nullopt;
   RcmPrior wide = registration;
-  wide.covariance.diagonal().array() += (Eigen::Array<double, 6, 1>() << Eigen::Array3d::Constant(missed_m * missed_m),
-                                         Eigen::Array3d::Constant(missed_rad * missed_rad))
-                                            .finished();
+  wide.covariance.diagonal().head<3>().array() += missed_m * missed_m;
+  wide.covariance.diagonal().tail<3>().array() += missed_rad * missed_rad;
   return wide;
 }
 
@@ -105,20 +102,13 @@ Observation::MarkerPose marker_pose_of(const Marker& marker, const PoseUnknowns&
 }
 
 Observation observation_of(const Scene& scene, const FineFit& fit) {
-  Observation observation;
   const ShaftPose& pose = fit.unknowns.pose();
   const auto line = centre_line(scene.camera, scene.marker, pose.camera_from_unrolled, pose.psi_rad);
-  if (!line) {
-    observation.status = Status::poor_fit;
-    return observation;
-  }
+  Observation observation;
+  observation.status = Status::poor_fit;
+  if (!line) return observation;
+  observation = observed_line(*line, scene, fit);
   observation.status = Status::ok;
-  const LineSigma sigma = sigma_of(*line, scene, fit);
-  observation.tau_rad = line->tau_rad;
-  observation.sigma_tau_rad = sigma.tau_rad;
-  observation.edges_ideal_px = line->ideal_px;
-  observation.edges_covariance_px2 = sigma.edges_px2;
-  for (std::size_t k = 0; k < 4; ++k) observation.edges_raw_px[k] = scene.camera.raw_from_ideal(line->ideal_px[k]);
   const RcmPrior* registration = scene.registration;
   observation.features = features_of(
       line->ideal_px, registration ? projected_rcm_px(scene.camera, registration->camera_from_rcm) : std::nullopt);

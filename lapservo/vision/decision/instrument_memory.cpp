@@ -1,28 +1,11 @@
 #include "lapservo/vision/decision/instrument_memory.h"
 
-#include <algorithm>
-
 namespace lapservo::internal {
-namespace {
-
-LookSchedule schedule_after(const FineFit& fit, LookSchedule schedule) {
-  if (fit.asked)
-    schedule.looked(fit.processing, fit.processing_explained > 0);
-  else
-    schedule.passed();
-  return schedule;
-}
-
-}  // namespace
-
-PoseVector InstrumentMemory::expected_step(double at_s) const {
-  constexpr double most_steps = 4;  // hands and arms do not move evenly for longer
-  const double steps = step_s > 0 ? std::clamp((at_s - time_s) / step_s, 0.0, most_steps) : 0;
-  return steps * step;
-}
 
 PoseUnknowns InstrumentMemory::expected_pose(double at_s) const {
-  return last.changed_by(expected_step(at_s));
+  constexpr double most_steps = 4;  // hands and arms do not move evenly for longer
+  const double steps = step_s > 0 ? std::clamp((at_s - time_s) / step_s, 0.0, most_steps) : 0;
+  return last.changed_by(steps * step);
 }
 
 Expected InstrumentMemory::expected(double at_s) const {
@@ -37,10 +20,11 @@ InstrumentMemory remembered(const std::optional<InstrumentMemory>& before, const
                           .last = fit.unknowns,
                           .step = PoseVector::Zero(),
                           .blur = fit.blur,
-                          .looks = schedule_after(fit, before ? before->looks : LookSchedule{}),
+                          .looks = before ? before->looks : LookSchedule{},
                           .bias_px = fit.bias_px,
                           .departure = fit.departure,
                           .among_others = among_others};
+  fit.asked ? memory.looks.looked(fit.processing, fit.processing_explained > 0) : memory.looks.passed();
   if (before && before->last.through_rcm() == fit.unknowns.through_rcm()) {
     memory.step = before->last.change_to(fit.unknowns);
     memory.step_s = time_s - before->time_s;

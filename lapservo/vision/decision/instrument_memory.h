@@ -12,9 +12,9 @@
 
 namespace lapservo::internal {
 
-/// In which of a followed marker's frames to look at what the camera did to the image (camera_look.h). A camera that
-/// processes its images is looked at in each frame, since what to take off depends on the frame. One that does not is
-/// looked at now and then, and where the blur changes (Expected). A full look that stays without an answer costs
+/// In which of a followed marker's frames to look at what the camera did to the image (picture_processing.h). A camera
+/// that processes its images is looked at in each frame, since what to take off depends on the frame. One that does not
+/// is looked at now and then, and where the blur changes (Expected). A full look that stays without an answer costs
 /// several times a tracked frame, and the next frame rarely differs: it is repeated after 1, 2, 4, ... frames.
 class LookSchedule {
  public:
@@ -49,9 +49,6 @@ struct InstrumentMemory {
   Expected expected(double at_s) const;
   /// Where it is when it moves on as it did, for some steps at most.
   PoseUnknowns expected_pose(double at_s) const;
-
- private:
-  PoseVector expected_step(double at_s) const;
 };
 
 /// After a frame in which it was found.

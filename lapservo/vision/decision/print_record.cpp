@@ -11,10 +11,6 @@ namespace {
 
 constexpr const PrintRecordLimits& limits = print_record_limits;
 
-std::ptrdiff_t count(const std::array<PrintRecord::View, print_sides>& views, PrintRecord::View view) {
-  return std::count(views.begin(), views.end(), view);
-}
-
 }  // namespace
 
 bool shows_the_rigs_print(const FineFit& fit) {
@@ -35,7 +31,7 @@ void PrintRecord::add(double tau_rad, View view) {
 
 PrintSides PrintRecord::known_sides() const {
   PrintSides known;
-  if (count(views_, View::off) > 0 || count(views_, View::the_rigs) < 2) return known;
+  if (std::ranges::count(views_, View::off) > 0 || std::ranges::count(views_, View::the_rigs) < 2) return known;
   const auto reach = [](double rad) { return static_cast<std::size_t>(std::lround(rad / two_pi * print_sides)); };
   const auto seen_within = [&](std::size_t side, std::size_t steps) {
     std::size_t seen = 0;
@@ -49,8 +45,8 @@ PrintSides PrintRecord::known_sides() const {
 }
 
 bool PrintRecord::is_off() const {
-  const auto off = count(views_, View::off);
-  const auto others = static_cast<std::ptrdiff_t>(print_sides) - count(views_, View::unseen) - off;
+  const auto off = std::ranges::count(views_, View::off);
+  const auto others = static_cast<std::ptrdiff_t>(print_sides) - std::ranges::count(views_, View::unseen) - off;
   return off >= limits.least_off_sides && off > limits.off_for_others * others;
 }
 

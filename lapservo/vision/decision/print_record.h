@@ -1,7 +1,6 @@
 #pragma once
 
 #include <array>
-#include <cstddef>
 #include <cstdint>
 
 #include "lapservo/vision/model/fine_fit.h"
@@ -11,8 +10,7 @@ namespace lapservo::internal {
 
 /// The evidence of a run's frames about a print.
 struct PrintRecordLimits {
-  double wholly_located = 0.8,
-         most_p_false = 1e-4;  ///< the rig's: all boundaries on so many lines, psi so rarely wrong
+  double wholly_located = 0.8, most_p_false = 1e-4;  ///< the rig's: all boundaries on such a part, psi so rarely wrong
   /// From one side that is so near, and two that show much of the same (a camera sees 1 rad to either side).
   double near_rad = 0.6, in_view_rad = 1.2;
   double exchange_s = 2;                        ///< of which nothing was added for so long may be another instrument's

@@ -1,9 +1,7 @@
 #include "lapservo/vision/decision/two_moments.h"
 
 #include <algorithm>
-#include <array>
 #include <cstddef>
-#include <optional>
 
 #include "lapservo/core/inplace_vector.h"
 #include "lapservo/core/statistics.h"
@@ -39,8 +37,7 @@ Boundaries boundaries_in_image(const Scene& scene, const ShaftPose& pose, int li
     if (!is_printed(scene.marker, tau_rad)) continue;
     const auto ends_m = boundaries_m(scene.marker, tau_rad);
     for (std::size_t k = 0; k < 4; ++k) {
-      const Eigen::Vector3d point =
-          pose.camera_from_unrolled * surface_point(scene.marker.radius_m(), azimuth_rad, ends_m[k]);
+      const Eigen::Vector3d point = point_on(pose, scene.marker, azimuth_rad, ends_m[k]);
       if (!scene.field.contains(point)) continue;
       const ProjectionWithJacobian image = scene.camera.raw_with_jacobian(point);
       boundaries[k].push_back({image.point_px, (image.d_px_d_point * axis).normalized()});
@@ -89,12 +86,7 @@ bool is_near(const Boundaries& boundaries, const Eigen::Vector2d& raw_px, double
 // The part of a change of values that shows at a point as well; 0 where another one shows.
 float part_of(const Value& change, const Value& seen) {
   const float along = seen.dot(change), squares = seen.squaredNorm() * change.squaredNorm();
-  return along > 0 && along * along > limits.least_alike * squares ? along / change.squaredNorm() : 0;
-}
-
-// Whatever changes there, by a change of values.
-float size_by(const Value& change, const Value& seen) {
-  return seen.norm() / change.norm();
+  return along > 0 && along * along > edge_limits.least_alike * squares ? along / change.squaredNorm() : 0;
 }
 
 // Where a fit has the boundaries, and what changes there.
@@ -138,6 +130,7 @@ bool shows_twice(const Scene& scene, const PoseUnknowns& pose, const FittedBound
   const auto moved_by = [&](double steps) {
     return boundaries_in_image(scene, pose.changed_by(steps * step).pose(), line_count);
   };
+  const auto size_by = [](const Value& change, const Value& seen) { return seen.norm() / change.norm(); };
   const auto part = change_at(scene, boundaries, moved_by(1), limits.apart_px, edge_px, part_of);
   if (!part || *part < limits.least_part) return false;
   const auto amid = change_at(scene, boundaries, moved_by(0.5), limits.apart_px / 2, amid_px, size_by);

@@ -11,7 +11,6 @@ namespace lapservo::internal {
 /// When a boundary shows in two places.
 struct TwoMomentsLimits {
   float least_part = 0.15F;     ///< of the boundary's change of colour; a recorder that adds less hardly moves psi
-  float least_alike = 0.7F;     ///< cosine squared of the two changes, in encoded b, g, r
   double apart_px = 6;          ///< the second image is as far away
   std::size_t min_points = 12;  ///< of all boundaries, that are so far away
   double told_for_s = 1;        ///< after a frame that shows it: recorders add frames all the time

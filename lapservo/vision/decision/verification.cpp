@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstddef>
 #include <cstdint>
 
 #include "lapservo/marker/azimuths.h"
@@ -13,10 +12,6 @@ namespace lapservo::internal {
 namespace {
 
 constexpr const ValidationLimits& limits = validation_limits;
-
-double squared(double x) {
-  return x * x;
-}
 
 // Without a well known RCM both ends are needed: they fix the depth, and with it everything else.
 bool shows_enough(const Scene& scene, const ColourAgreement& agreement, const FineFit& fit) {
@@ -42,34 +37,30 @@ bool misses_a_boundary(const Scene& scene, const FineFit& fit) {
   return false;
 }
 
-// Whether psi is hardly ever wrong, whatever the print is; what the rig's tolerance makes of it does not count.
-bool has_right_psi(const Scene& scene, const FineFit& fit) {
-  return fit.p_false < scene.max_p_false + limits.tolerance_slack * fit.p_false_by_tolerance;
-}
-
-// Sigma of psi, and the print.
+// Sigma of psi, and the print; psi must hardly ever be wrong, whatever the print is, but for the rig's tolerance.
 Status validate_psi(const Scene& scene, const FineFit& fit) {
-  const double limit = squared(limits.max_sigma_psi_rad), by_tolerance = fit.psi_variance_by_tolerance;
+  const double limit = limits.max_sigma_psi_rad * limits.max_sigma_psi_rad,
+               by_tolerance = fit.psi_variance_by_tolerance;
   if (fit.off_probability > limits.certainly_off || (by_tolerance < limit && misses_a_boundary(scene, fit)))
     return fit.is_well_seen() ? Status::marker_mismatch : Status::uncertain;
   const bool is_sure = fit.psi_variance_rad2() < limit + limits.tolerance_slack * by_tolerance;
-  return is_sure && has_right_psi(scene, fit) ? Status::ok : Status::uncertain;
+  const bool is_right = fit.p_false < scene.max_p_false + limits.tolerance_slack * fit.p_false_by_tolerance;
+  return is_sure && is_right ? Status::ok : Status::uncertain;
 }
 
 }  // namespace
 
 int lines_in_clear_view(const Scene& scene, const ShaftPose& pose, std::size_t boundary, int lines) {
-  constexpr double reach = 0.9, beside_px = 4;
+  constexpr double beside_px = 4;
   const auto view = view_cylinder(pose.camera_from_unrolled, scene.marker.radius_m());
   if (!view) return 0;
   const Eigen::Vector3d axis = pose.camera_from_unrolled.rotation * Eigen::Vector3d::UnitZ();
   int count = 0;
   for (int i = 0; i < lines; ++i) {
-    const double azimuth_rad = visible_azimuth_rad(*view, reach, i, lines);
+    const double azimuth_rad = visible_azimuth_rad(*view, edge_limits.line_reach, i, lines);
     const double tau_rad = marker_azimuth_rad(scene.marker, azimuth_rad, pose.psi_rad);
     const double along_m = boundaries_m(scene.marker, tau_rad)[boundary];
-    const Eigen::Vector3d point =
-        pose.camera_from_unrolled * surface_point(scene.marker.radius_m(), azimuth_rad, along_m);
+    const Eigen::Vector3d point = point_on(pose, scene.marker, azimuth_rad, along_m);
     const double px_per_m = (scene.camera.raw_with_jacobian(point).d_px_d_point * axis).norm();
     const Eigen::Vector3d apart = 2 * beside_px / px_per_m * axis;
     const LineInImage<2> sides(scene, point - apart, apart);
@@ -85,10 +76,9 @@ ColourAgreement colour_agreement(const Scene& scene, const ShaftPose& pose, cons
   constexpr double blurred_px = 1.5, min_guard = 0.02;
   const auto view = view_cylinder(pose.camera_from_unrolled, scene.marker.radius_m());
   if (!view) return {};
-  const double radius_m = scene.marker.radius_m(), length_m = scene.marker.length_m();
+  const double length_m = scene.marker.length_m();
   const Eigen::Vector3d axis = pose.camera_from_unrolled.rotation * Eigen::Vector3d::UnitZ();
-  const Eigen::Vector3d middle =
-      pose.camera_from_unrolled * surface_point(radius_m, view->facing_azimuth_rad, length_m / 2);
+  const Eigen::Vector3d middle = point_on(pose, scene.marker, view->facing_azimuth_rad, length_m / 2);
   const double px_per_m = (scene.camera.raw_with_jacobian(middle).d_px_d_point * axis).norm();
   const double guard_m = std::max(min_guard * length_m, blurred_px / px_per_m);
   const std::array blurred_m{std::max(guard_m, blurs_beyond * blur.along_px[0] / px_per_m),
@@ -100,7 +90,7 @@ ColourAgreement colour_agreement(const Scene& scene, const ShaftPose& pose, cons
   for (const auto& line : surface.lines) {
     const double tau_rad = marker_azimuth_rad(scene.marker, line.azimuth_rad, pose.psi_rad);
     const auto ends_m = boundaries_m(scene.marker, tau_rad);
-    if (distance_to_seam_rad(scene.marker, tau_rad) * radius_m < guard_m) continue;
+    if (distance_to_seam_rad(scene.marker, tau_rad) * scene.marker.radius_m() < guard_m) continue;
     for (std::size_t sample = 0; sample < line.classes.size(); ++sample) {
       const double along_m = surface.along_m(sample);
       const std::uint8_t colour = line.classes[sample];

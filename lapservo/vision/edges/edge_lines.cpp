@@ -20,7 +20,7 @@ namespace lapservo::internal {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-constexpr std::size_t max_lanes = 16;
+constexpr std::size_t max_lanes = 16, alignment = max_lanes * sizeof(float);
 using Floats = hn::CappedTag<float, max_lanes>;
 using Ints = hn::RebindToSigned<Floats>;
 using V = hn::Vec<Floats>;
@@ -29,7 +29,7 @@ using Mask = hn::Mask<Floats>;
 
 // A value for every lane.
 struct Lanes {
-  alignas(64) std::array<float, max_lanes> value;
+  alignas(alignment) std::array<float, max_lanes> value;
   V load() const { return hn::Load(Floats(), value.data()); }
   void store(V values) { hn::Store(values, Floats(), value.data()); }
 };
@@ -68,10 +68,10 @@ struct SampledLanes {
 
 // The four pixels around a place, in each lane: two words a row hold blue, green and red of both.
 struct Neighbours {
-  alignas(64) std::array<std::array<std::int32_t, max_lanes>, 4> words;
+  alignas(alignment) std::array<std::array<std::int32_t, max_lanes>, 4> words;
 
   void load(const ImageView& image, VI u, VI v, std::size_t lanes) {
-    alignas(64) std::array<std::int32_t, max_lanes> us, vs;
+    alignas(alignment) std::array<std::int32_t, max_lanes> us, vs;
     hn::Store(u, Ints(), us.data());
     hn::Store(v, Ints(), vs.data());
     for (std::size_t j = 0; j < lanes; ++j) {
@@ -87,17 +87,8 @@ struct Neighbours {
   VI value(std::size_t c, std::size_t right, std::size_t lower) const {
     const std::size_t byte = c + 3 * right;
     const VI word = hn::Load(Ints(), words[2 * lower + (byte > 3 ? 1 : 0)].data());
-    const VI low = hn::Set(Ints(), 255);
-    switch (byte > 3 ? byte - 2 : byte) {
-      case 0:
-        return hn::And(word, low);
-      case 1:
-        return hn::And(hn::ShiftRight<8>(word), low);
-      case 2:
-        return hn::And(hn::ShiftRight<16>(word), low);
-      default:
-        return hn::And(hn::ShiftRight<24>(word), low);
-    }
+    const int bits = 8 * static_cast<int>(byte > 3 ? byte - 2 : byte);
+    return hn::And(hn::ShiftRightSame(word, bits), hn::Set(Ints(), 255));
   }
 };
 
@@ -167,7 +158,7 @@ HWY_INLINE BlurredLanes blurred_at(const BlurredEdge* table, V u) {
   if constexpr (WithRoots) {
     const Mask far = hn::Gt(u, last);
     const V safe = hn::Max(u, last), root = hn::Sqrt(safe),
-            correction = hn::Div(hn::Set(d, 0.125F), hn::Mul(safe, safe));
+            correction = hn::Div(hn::Set(d, 1.0F / 8), hn::Mul(safe, safe));
     const V one = hn::Set(d, 1), three = hn::Set(d, 3);
     edge.root = hn::IfThenElse(far, hn::Mul(root, hn::Sub(one, correction)), field(2));
     edge.three_halves = hn::IfThenElse(far, hn::Mul(hn::Mul(root, safe), hn::MulAdd(three, correction, one)), field(3));
@@ -191,14 +182,6 @@ HWY_INLINE std::array<V, Count> dots(const std::array<const Column*, Count>& col
 
 HWY_INLINE V dot(const Column& a, const Column& b, std::size_t samples) {
   return dots<1>({&a}, b, samples)[0];
-}
-
-void subtract(Column& from, V factor, const Column& column, std::size_t samples) {
-  for (std::size_t i = 0; i < samples; ++i) from[i].store(hn::NegMulAdd(factor, column[i].load(), from[i].load()));
-}
-
-void scale(Column& column, V factor, std::size_t samples) {
-  for (std::size_t i = 0; i < samples; ++i) column[i].store(hn::Mul(factor, column[i].load()));
 }
 
 // The model's linear basis, a constant and then the shapes, made orthonormal; and the shapes' derivatives by the edge's
@@ -253,7 +236,7 @@ struct Basis {
       by_blur[0][i].store(hn::Mul(slope, u));
       if constexpr (Shapes == 2) {
         const V up = hn::Mul(here, rise), down = hn::Mul(here, fall);
-        const V bent = hn::Mul(hn::Mul(bend, hn::Set(d, 1.5F)), edge.root);
+        const V bent = hn::Mul(hn::Mul(bend, hn::Set(d, 3.0F / 2)), edge.root);
         unit[2][i].store(hn::Mul(up, hn::NegMulAdd(bend, edge.three_halves, edge.root)));
         by_position[1][i].store(hn::Mul(down, hn::Sub(bent, edge.root_slope)));
         by_blur[1][i].store(hn::Mul(down, hn::NegMulAdd(u, edge.root_slope, hn::Mul(hn::Set(d, 0.5F), edge.root))));
@@ -273,12 +256,14 @@ struct Basis {
       const V before = dot(column, column, samples);
       for (std::size_t k = 0; k < j; ++k) {
         triangle[k][j] = dot(unit[k], column, samples);
-        subtract(column, triangle[k][j], unit[k], samples);
+        for (std::size_t i = 0; i < samples; ++i)
+          column[i].store(hn::NegMulAdd(triangle[k][j], unit[k][i].load(), column[i].load()));
       }
       const V square = dot(column, column, samples);
       independent = hn::And(independent, hn::Gt(square, hn::Mul(hn::Set(d, 1e-5F), before)));
       triangle[j][j] = hn::Sqrt(square);
-      scale(column, hn::Div(hn::Set(d, 1), triangle[j][j]), samples);
+      const V factor = hn::Div(hn::Set(d, 1), triangle[j][j]);
+      for (std::size_t i = 0; i < samples; ++i) column[i].store(hn::Mul(factor, column[i].load()));
     }
   }
 
@@ -313,19 +298,11 @@ struct FitLanes {
   Mask converged;
 };
 
-// A line's values: light by channel, and the sums of its squares.
-struct LineLight {
-  const std::array<Column, 3>& light;
-  V squares;
-
-  LineLight(const std::array<Column, 3>& of_light, std::size_t samples) : light(of_light), squares(hn::Zero(Floats())) {
-    for (const Column& channel : light) squares = hn::Add(squares, dot(channel, channel, samples));
-  }
-};
-
-// One variable-projection step: linear amplitudes per channel, then the position in what they leave.
+// One variable-projection step: linear amplitudes per channel, then the position in what they leave. `squares`: the sum
+// of the light's.
 template <std::size_t Shapes>
-FitLanes project(const LineLanes& lines, const LineLight& seen, const Column& present, V edge_px) {
+FitLanes project(const LineLanes& lines, const std::array<Column, 3>& light, V squares, const Column& present,
+                 V edge_px) {
   const Floats d;
   const V zero = hn::Zero(d);
   const Basis<Shapes> basis(lines, present, edge_px);
@@ -337,9 +314,9 @@ FitLanes project(const LineLanes& lines, const LineLight& seen, const Column& pr
     columns[linear + Shapes + s] = &basis.by_blur[s];
   }
   FitLanes fit{zero, zero, zero, zero, zero, {zero, zero, zero}, {zero, zero, zero}, basis.independent};
-  V position_gradient = zero, position_and_blur = zero, squares = seen.squares;
+  V position_gradient = zero, position_and_blur = zero;
   for (std::size_t c = 0; c < 3; ++c) {
-    const auto products = dots(columns, seen.light[c], lines.samples);
+    const auto products = dots(columns, light[c], lines.samples);
     std::array<V, linear> amplitude;
     for (std::size_t j = 0; j < linear; ++j) {
       amplitude[j] = products[j];
@@ -402,14 +379,16 @@ FitLanes select(Mask mask, const FitLanes& yes, const FitLanes& no) {
 
 // iterate() of edge_profile.cpp in every lane.
 template <std::size_t Shapes>
-FitLanes iterate(const LineLanes& lines, const LineLight& light, const Column& present, int iterations) {
+FitLanes iterate(const LineLanes& lines, const std::array<Column, 3>& light, const Column& present, int iterations) {
   const Floats d;
+  V squares = hn::Zero(d);
+  for (const Column& channel : light) squares = hn::Add(squares, dot(channel, channel, lines.samples));
   const V reach = hn::Mul(hn::Set(d, 0.5F), samples_of(lines));
   V edge_px = hn::Zero(d);
   FitLanes fit{};
   Mask active = hn::Eq(edge_px, edge_px);
   for (int iteration = 0; iteration < iterations && !hn::AllFalse(d, active); ++iteration) {
-    fit = select(active, project<Shapes>(lines, light, present, edge_px), fit);
+    fit = select(active, project<Shapes>(lines, light, squares, present, edge_px), fit);
     active = hn::And(active, fit.converged);
     const V step = hn::Min(hn::Max(fit.offset, hn::Set(d, -2)), hn::Set(d, 2));
     edge_px = hn::IfThenElse(active, hn::Add(edge_px, step), edge_px);
@@ -432,7 +411,7 @@ void locate(const LightImage& image, std::span<const EdgeLine> lines, int iterat
     present[i].store(hn::IfThenElseZero(hn::Le(t, lanes.last.load()), hn::Set(d, 1)));
   const SampledLanes sampled =
       image.channels().differs() ? sample<true>(image, lanes, present) : sample<false>(image, lanes, present);
-  const FitLanes fit = iterate<Shapes>(lanes, LineLight(sampled.light, lanes.samples), present, iterations);
+  const FitLanes fit = iterate<Shapes>(lanes, sampled.light, present, iterations);
   Lanes offset, information, variance, blur_gradient, blur_information, converged;
   std::array<Lanes, 3> step, before;
   offset.store(fit.offset), information.store(fit.information), variance.store(fit.residual_variance);
@@ -442,8 +421,7 @@ void locate(const LightImage& image, std::span<const EdgeLine> lines, int iterat
   for (std::size_t j = 0; j < lines.size(); ++j) {
     const auto of = [j](const Lanes& lane) { return lane.value[j]; };
     if (of(sampled.brightest) >= LightImage::saturated_value) {
-      fits.push_back(Shapes == 1 ? locate_step(image, lines[j], iterations)
-                                 : locate_contour(image, lines[j], iterations));
+      fits.push_back(locate_edge(image, lines[j], Shapes == 1 ? EdgeKind::step : EdgeKind::contour, iterations));
     } else {
       fits.push_back({of(converged) > 0,
                       of(offset),
@@ -466,11 +444,8 @@ EdgeFits locate_all(const LightImage& image, std::span<const EdgeLine> lines, in
   return fits;
 }
 
-EdgeFits locate_steps(const LightImage& image, std::span<const EdgeLine> lines, int iterations) {
-  return locate_all<1>(image, lines, iterations);
-}
-EdgeFits locate_contours(const LightImage& image, std::span<const EdgeLine> lines, int iterations) {
-  return locate_all<2>(image, lines, iterations);
+EdgeFits locate_edges(const LightImage& image, std::span<const EdgeLine> lines, EdgeKind kind, int iterations) {
+  return kind == EdgeKind::step ? locate_all<1>(image, lines, iterations) : locate_all<2>(image, lines, iterations);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -480,8 +455,7 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace lapservo::internal {
 
-HWY_EXPORT(locate_steps);
-HWY_EXPORT(locate_contours);
+HWY_EXPORT(locate_edges);
 
 namespace {
 
@@ -502,20 +476,14 @@ EdgeProfile sample_profile(const LightImage& light, const EdgeLine& line) {
 
 }  // namespace
 
-EdgeFit locate_step(const LightImage& light, const EdgeLine& line, int iterations) {
-  return fit_step(sample_profile(light, line), line.blur_px, iterations);
+EdgeFit locate_edge(const LightImage& light, const EdgeLine& line, EdgeKind kind, int iterations) {
+  const EdgeProfile profile = sample_profile(light, line);
+  return kind == EdgeKind::step ? fit_step(profile, line.blur_px, iterations)
+                                : fit_contour(profile, line.blur_px, line.contour_radius_px, iterations);
 }
 
-EdgeFit locate_contour(const LightImage& light, const EdgeLine& line, int iterations) {
-  return fit_contour(sample_profile(light, line), line.blur_px, line.contour_radius_px, iterations);
-}
-
-EdgeFits locate_steps(const LightImage& light, std::span<const EdgeLine> lines, int iterations) {
-  return HWY_DYNAMIC_DISPATCH(locate_steps)(light, lines, iterations);
-}
-
-EdgeFits locate_contours(const LightImage& light, std::span<const EdgeLine> lines, int iterations) {
-  return HWY_DYNAMIC_DISPATCH(locate_contours)(light, lines, iterations);
+EdgeFits locate_edges(const LightImage& light, std::span<const EdgeLine> lines, EdgeKind kind, int iterations) {
+  return HWY_DYNAMIC_DISPATCH(locate_edges)(light, lines, kind, iterations);
 }
 
 }  // namespace lapservo::internal

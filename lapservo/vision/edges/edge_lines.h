@@ -15,19 +15,20 @@ struct EdgeLine {
   float du = 1, dv = 0;         ///< unit direction; offsets count along it
   int before = 0, after = 0;    ///< samples on either side, at most EdgeProfile::max_samples - 1 together
   float blur_px = 1;            ///< of the edge along the line, one sigma
-  float contour_radius_px = 0;  ///< for locate_contours
+  float contour_radius_px = 0;  ///< for EdgeKind::contour
 };
 
 inline constexpr std::size_t max_edge_lines = 512;
 using EdgeFits = InplaceVector<EdgeFit, max_edge_lines>;
 
-/// fit_step and fit_contour of the light along a line.
-EdgeFit locate_step(const LightImage& light, const EdgeLine& line, int iterations);
-EdgeFit locate_contour(const LightImage& light, const EdgeLine& line, int iterations);
+/// By fit_step or fit_contour.
+enum class EdgeKind { step, contour };
+
+/// By the light along a line.
+EdgeFit locate_edge(const LightImage& light, const EdgeLine& line, EdgeKind kind, int iterations);
 
 /// The same for many lines, several at once in the lanes of the processor's vectors (Highway, chosen when run): one fit
 /// a line, equal to rounding. More than max_edge_lines: std::length_error.
-EdgeFits locate_steps(const LightImage& light, std::span<const EdgeLine> lines, int iterations);
-EdgeFits locate_contours(const LightImage& light, std::span<const EdgeLine> lines, int iterations);
+EdgeFits locate_edges(const LightImage& light, std::span<const EdgeLine> lines, EdgeKind kind, int iterations);
 
 }  // namespace lapservo::internal

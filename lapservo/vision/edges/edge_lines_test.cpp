@@ -87,10 +87,10 @@ void on_every_target(const Check& check) {
 class EdgeLines : public ::testing::TestWithParam<bool> {
  protected:
   EdgeFits together(const LightImage& light, std::span<const EdgeLine> lines, int iterations) const {
-    return GetParam() ? locate_contours(light, lines, iterations) : locate_steps(light, lines, iterations);
+    return locate_edges(light, lines, GetParam() ? EdgeKind::contour : EdgeKind::step, iterations);
   }
   EdgeFit alone(const LightImage& light, const EdgeLine& line, int iterations) const {
-    return GetParam() ? locate_contour(light, line, iterations) : locate_step(light, line, iterations);
+    return locate_edge(light, line, GetParam() ? EdgeKind::contour : EdgeKind::step, iterations);
   }
 };
 

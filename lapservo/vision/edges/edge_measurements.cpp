@@ -10,7 +10,6 @@
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/marker/azimuths.h"
 #include "lapservo/vision/edges/edge_lines.h"
-#include "lapservo/vision/edges/film_edge.h"
 
 namespace lapservo::internal {
 namespace {
@@ -23,25 +22,15 @@ struct Generatrix {
   Eigen::Vector3d outwards_unrolled, outwards, around, begin;
 };
 
-// The tools of a pass.
 struct Frame {
   const Scene& scene;
   const LightImage& light;
   const PoseUnknowns& unknowns;
   double film_m;
   CylinderView view;
-  Eigen::Matrix3d axes;                // of the unrolled frame, in the camera
-  Eigen::Vector3d camera_in_unrolled;  // [m]
-
-  Frame(const Scene& of_scene, const LightImage& of_light, const PoseUnknowns& of_unknowns, double of_film_m,
-        const CylinderView& of_view)
-      : scene(of_scene),
-        light(of_light),
-        unknowns(of_unknowns),
-        film_m(of_film_m),
-        view(of_view),
-        axes(unknowns.pose().camera_from_unrolled.rotation.toRotationMatrix()),
-        camera_in_unrolled(-axes.transpose() * unknowns.pose().camera_from_unrolled.translation) {}
+  // The unrolled frame's, in the camera; and the camera in it [m].
+  Eigen::Matrix3d axes = unknowns.pose().camera_from_unrolled.rotation.toRotationMatrix();
+  Eigen::Vector3d camera_in_unrolled = -axes.transpose() * unknowns.pose().camera_from_unrolled.translation;
 
   const Marker& marker() const { return scene.marker; }
   Generatrix generatrix(double azimuth_rad) const {
@@ -86,19 +75,11 @@ struct Frame {
 
 // Whether another instrument lies before a line through a point of the shaft, or before a part of it.
 bool lies_behind_another(const Frame& frame, const EdgeLine& line, const Generatrix& generatrix, double along_m) {
+  if (frame.scene.others.empty()) return false;
   const double depth_m = frame.point(generatrix, along_m).z();
   const Eigen::Vector2d centre_px(line.u_px, line.v_px), direction(line.du, line.dv);
   return frame.scene.hidden(centre_px, depth_m) || frame.scene.hidden(centre_px - line.before * direction, depth_m) ||
          frame.scene.hidden(centre_px + line.after * direction, depth_m);
-}
-
-// Measurement::row of a point, moving along `pull` [px/m], with its parts by psi and by the film.
-UnknownVector row_of(const PoseUnknowns& unknowns, const Eigen::Vector3d& point, const Eigen::Vector3d& pull,
-                     double by_psi, double by_film) {
-  UnknownVector row = unknowns.row(point, pull);
-  row[psi_unknown] = by_psi;
-  row[film_unknown] = by_film;
-  return row;
 }
 
 constexpr double aside_rad = 0.05;
@@ -199,23 +180,25 @@ bool place_boundary(const Frame& frame, const Neighbourhood& generatrices, std::
   double gap_px = HUGE_VAL;
   if (k > 0) gap_px = std::min(gap_px, (along_m[k] - along_m[k - 1]) * px_per_m);
   if (k < 3) gap_px = std::min(gap_px, (along_m[k + 1] - along_m[k]) * px_per_m);
+  const double own_px = 0.6 * gap_px;  // where it shows alone
   const double blur_px = blur.along_normal_px(place.normal), line_blur_px = blur_px / cosine;
-  const int reach =
-      static_cast<int>(std::min({2.5 * line_blur_px + effort.extra_px, 0.6 * gap_px - line_blur_px, 22.0}));
+  const int reach = static_cast<int>(
+      std::min({edge_limits.blur_reach * line_blur_px + effort.extra_px, own_px - line_blur_px, 22.0}));
   if (reach < 3) return false;
   const auto line = frame.edge_line(image.point_px, place.along, reach, reach, line_blur_px);
   if (!line) return false;
   place.line = *line;
   const Eigen::Vector3d pull = image.d_px_d_point.transpose() * normal;
   place.film_px_per_m = -pull.dot(generatrix.outwards);
-  place.measurement.row = row_of(frame.unknowns, point, pull, -slope_m * pull.dot(frame.axes.col(2)),
-                                 place.film_shift * film_sigma_m * place.film_px_per_m);
+  place.measurement.along_px_per_m = pull.dot(frame.axes.col(2));
+  place.measurement.row = frame.unknowns.row(point, pull);
+  place.measurement.row[psi_unknown] = -slope_m * place.measurement.along_px_per_m;
+  place.measurement.row[film_unknown] = place.film_shift * film_sigma_m * place.film_px_per_m;
   place.measurement.group = k;
   place.measurement.turn_fraction = wrap_two_pi(frame.tau(generatrix.azimuth_rad)) / frame.marker().covered_rad();
-  place.measurement.along_px_per_m = pull.dot(frame.axes.col(2));
   place.measurement.expected_px = image.point_px.cast<float>();
   place.measurement.normal = normal.cast<float>();
-  place.measurement.clear_px = static_cast<float>(0.6 * gap_px * cosine - blur_px);
+  place.measurement.clear_px = static_cast<float>(own_px * cosine - blur_px);
   return true;
 }
 
@@ -262,7 +245,6 @@ void see_film(const Frame& frame, std::size_t k, double even_light, const EdgeBl
     const float before = dot(edges[i].before, steps.sum), step = dot(edges[i].step, steps.sum);
     points.push_back(k == 0 ? EndPoint{before, step} : EndPoint{-before - step, step});
   }
-  static_assert(max_end_points >= max_lines);
   const auto gloss = gloss_of(points);
   for (std::size_t at = 0; at < points.size(); ++at) {
     BoundaryPlace& place = places[steps.points[at]];
@@ -280,7 +262,6 @@ void see_film(const Frame& frame, std::size_t k, double even_light, const EdgeBl
   }
 }
 
-// A boundary point that was located.
 struct Candidate {
   const BoundaryPlace* place;
   const EdgeFit* edge;
@@ -308,13 +289,12 @@ void trust(std::span<const Candidate> candidates, const EdgeBlur& blur, EdgeMeas
     const float projection = dot(edge->step, typical), square = dot(edge->step, edge->step);
     const bool alike = projection > edge_limits.min_step * typical_square &&
                        projection * projection > edge_limits.least_alike * square * typical_square;
-    if (!alike || edge->residual_variance >
-                      edge_limits.max_residual * square + edge_limits.max_residual_variances * typical_variance)
+    const int max_variances = edge_limits.max_residual_sigmas * edge_limits.max_residual_sigmas;
+    if (!alike || edge->residual_variance > edge_limits.max_residual * square + max_variances * typical_variance)
       continue;
     const double variance = 0.5 * (edge->residual_variance + typical_variance) * edge_limits.interpolation_noise;
     const double cosine = place->normal.x();
-    out.all.push_back(place->measurement);
-    Measurement& measurement = out.all.end()[-1];
+    Measurement& measurement = out.all.emplace_back() = place->measurement;
     const double moved_px = place->moved_by_blur_px * cosine;
     measurement.expected_px += static_cast<float>(moved_px) * measurement.normal;
     measurement.residual_px = edge->offset_px * cosine - moved_px - place->film_moved_px;
@@ -325,12 +305,6 @@ void trust(std::span<const Candidate> candidates, const EdgeBlur& blur, EdgeMeas
   }
 }
 
-// As a part of the visible half width: blur mixes what lies beside the shaft into what is near its sides.
-double line_reach(const EdgeBlur& blur, double radius_px) {
-  return std::clamp(1 - edge_limits.blurs_from_side * blur.sides_px / radius_px, edge_limits.least_line_reach,
-                    edge_limits.line_reach);
-}
-
 void measure_boundaries(const Frame& frame, const Effort& effort, const EdgeBlur& blur, EdgeMeasurements& out) {
   const double radius_px = frame.marker().radius_m() / frame.view.camera_to_axis_m * frame.scene.camera.fx_px;
   out.radius_px = radius_px;
@@ -339,7 +313,10 @@ void measure_boundaries(const Frame& frame, const Effort& effort, const EdgeBlur
   std::array<bool, 4> jumps{};
   std::array<BlurEllipse, 4> ellipses;
   for (std::size_t k = 0; k < 4; ++k) jumps[k] = jumps_at_seam(frame.marker(), k), ellipses[k] = blur.ellipse(k);
-  const double sine_of_half = std::sin(frame.view.half_visible_rad), reach = line_reach(blur, radius_px);
+  // Blur mixes what lies beside the shaft into what is near its sides.
+  const double sine_of_half = std::sin(frame.view.half_visible_rad),
+               reach = std::clamp(1 - edge_limits.blur_reach * blur.sides_px / radius_px, edge_limits.least_line_reach,
+                                  edge_limits.line_reach);
   InplaceVector<BoundaryPlace, 4 * max_lines> places;
   InplaceVector<EdgeLine, 4 * max_lines> lines;
   for (int i = 0; i < out.lines; ++i) {
@@ -349,10 +326,10 @@ void measure_boundaries(const Frame& frame, const Effort& effort, const EdgeBlur
     const auto along_m = boundaries_m(frame.marker(), tau_rad);
     const double seam_px = distance_to_seam_rad(frame.marker(), tau_rad) * radius_px * std::sqrt(1 - sine * sine);
     for (std::size_t k = 0; k < 4; ++k) {
-      if (jumps[k] && seam_px < edge_limits.seam_blurs * blur.along_px[k] + edge_limits.seam_px) continue;
+      if (jumps[k] && seam_px < edge_limits.blur_reach * blur.along_px[k] + edge_limits.seam_px) continue;
       BoundaryPlace& place = places.emplace_back();
       if (!place_boundary(frame, generatrices, k, along_m, slopes_m[k], effort, ellipses[k], place) ||
-          (!frame.scene.others.empty() && lies_behind_another(frame, place.line, generatrices.middle, along_m[k]))) {
+          lies_behind_another(frame, place.line, generatrices.middle, along_m[k])) {
         places.pop_back();
         continue;
       }
@@ -361,7 +338,7 @@ void measure_boundaries(const Frame& frame, const Effort& effort, const EdgeBlur
       lines.push_back(place.line);
     }
   }
-  const EdgeFits edges = locate_steps(frame.light, lines, effort.iterations);
+  const EdgeFits edges = locate_edges(frame.light, lines, EdgeKind::step, effort.iterations);
   if (effort.thinning == 1) {
     const double even_light = even_light_in(places, edges);
     for (const std::size_t end : {0U, 3U}) see_film(frame, end, even_light, blur, places, edges);
@@ -401,64 +378,50 @@ struct Side {
         group(sign < 0 ? 4 : 5) {}
 };
 
-// How far a line across a shaft's side reaches out of it and into it: of so wide a blur and, where the side's place is
-// not known to a fraction of it, some more.
-int outside_of_side_px(double blur_px, double extra_px) {
-  return static_cast<int>(std::min(2.5 * blur_px + extra_px, 14.0));
-}
-int inside_of_side_px(double radius_px) {
-  return static_cast<int>(std::min(0.34 * radius_px, 26.0));
-}
-
-// A point of a side where it is expected.
-struct SidePlace {
-  Measurement measurement;
-  EdgeLine line;
-};
-
-// False where it can't be looked for.
-bool place_side(const Frame& frame, const Side& side, double along_m, const Effort& effort, double blur_px,
-                SidePlace& place) {
+// The line to look along for a point of a side, and that point where it is expected. Nullopt where it can't be looked
+// for.
+std::optional<EdgeLine> place_side(const Frame& frame, const Side& side, double along_m, const Effort& effort,
+                                   double blur_px, Measurement& measurement) {
   const Eigen::Vector3d point = frame.point(side.contour, along_m);
-  if (!frame.scene.field.contains(point)) return false;
+  if (!frame.scene.field.contains(point)) return std::nullopt;
   const ProjectionWithJacobian image = frame.scene.camera.raw_with_jacobian(point);
   const Eigen::Vector2d along = (image.d_px_d_point * frame.axes.col(2)).normalized();
   Eigen::Vector2d inwards(-along.y(), along.x());
   if (inwards.dot(frame.scene.camera.raw_from_point(frame.point(side.deep, along_m)) - image.point_px) < 0)
     inwards = -inwards;
   const double radius_px = frame.marker().radius_m() / point.norm() * frame.scene.camera.fx_px;
-  const int inside = inside_of_side_px(radius_px), outside = outside_of_side_px(blur_px, effort.extra_of_sides_px);
-  if (inside < 3) return false;
-  const double room_m = 2.5 * blur_px * frame.marker().length_m() / 200;
-  if (!one_band(frame, side.contour.azimuth_rad, side.deep.azimuth_rad, along_m, room_m)) return false;
-  const auto line = frame.edge_line(image.point_px, inwards, outside, inside, blur_px);
-  if (!line) return false;
-  place.line = *line;
-  place.line.contour_radius_px = static_cast<float>(radius_px);
-  place.measurement.row = row_of(frame.unknowns, point, image.d_px_d_point.transpose() * inwards, 0, 0);
-  place.measurement.group = side.group;
-  place.measurement.expected_px = image.point_px.cast<float>();
-  place.measurement.normal = inwards.cast<float>();
-  return true;
+  // Into the shaft, and out of it: by the blur and, where the side's place is not known to a fraction of it, some more.
+  const double reach_px = edge_limits.blur_reach * blur_px;
+  const int inside = static_cast<int>(std::min(0.34 * radius_px, 26.0)),
+            outside = static_cast<int>(std::min(reach_px + effort.extra_of_sides_px, 14.0));
+  if (inside < 3) return std::nullopt;
+  const double room_m = reach_px * frame.marker().length_m() / 200;
+  if (!one_band(frame, side.contour.azimuth_rad, side.deep.azimuth_rad, along_m, room_m)) return std::nullopt;
+  auto line = frame.edge_line(image.point_px, inwards, outside, inside, blur_px);
+  if (!line || lies_behind_another(frame, *line, side.contour, along_m)) return std::nullopt;
+  line->contour_radius_px = static_cast<float>(radius_px);
+  measurement.row = frame.unknowns.row(point, image.d_px_d_point.transpose() * inwards);
+  measurement.group = side.group;
+  measurement.expected_px = image.point_px.cast<float>();
+  measurement.normal = inwards.cast<float>();
+  return line;
 }
 
 void measure_sides(const Frame& frame, const Effort& effort, double blur_px, EdgeMeasurements& out) {
   const int count = stations / effort.thinning;
   const std::array<Side, 2> sides{Side(frame, -1), Side(frame, 1)};
-  InplaceVector<SidePlace, 2 * stations> places;
+  InplaceVector<Measurement, 2 * stations> places;
   InplaceVector<EdgeLine, 2 * stations> lines;
   for (int station = 0; station < count; ++station)
     for (const Side& side : sides) {
       const double along_m = frame.marker().length_m() * (station + 0.5) / count;
-      SidePlace& place = places.emplace_back();
-      if (place_side(frame, side, along_m, effort, blur_px, place) &&
-          (frame.scene.others.empty() || !lies_behind_another(frame, place.line, side.contour, along_m)))
-        lines.push_back(place.line);
+      if (const auto line = place_side(frame, side, along_m, effort, blur_px, places.emplace_back()))
+        lines.push_back(*line);
       else
         places.pop_back();
     }
   out.sides_in_image = static_cast<int>(places.size());
-  const EdgeFits edges = locate_contours(frame.light, lines, effort.iterations);
+  const EdgeFits edges = locate_edges(frame.light, lines, EdgeKind::contour, effort.iterations);
   InplaceVector<float, 2 * stations> variances;
   for (const EdgeFit& edge : edges)
     if (edge.converged) variances.push_back(edge.residual_variance);
@@ -471,8 +434,7 @@ void measure_sides(const Frame& frame, const Effort& effort, double blur_px, Edg
     const double sigma_px =
         std::sqrt(variance / edge.information + edge_limits.side_floor_px * edge_limits.side_floor_px);
     if (sigma_px > edge_limits.max_side_sigma_px) continue;
-    out.all.push_back(places[i].measurement);
-    Measurement& measurement = out.all.end()[-1];
+    Measurement& measurement = out.all.emplace_back() = places[i];
     measurement.residual_px = edge.offset_px;
     measurement.sigma_px = sigma_px;
     out.side_blur.add(edge, variance);
@@ -492,7 +454,7 @@ EdgeMeasurements measure_edges(const Scene& scene, const LightImage& light, cons
   EdgeMeasurements out;
   const auto view = view_cylinder(unknowns.pose().camera_from_unrolled, scene.marker.radius_m());
   if (!view) return out;
-  const Frame frame(scene, light, unknowns, film_m, *view);
+  const Frame frame{scene, light, unknowns, film_m, *view};
   measure_boundaries(frame, effort, blur, out);
   measure_sides(frame, effort, blur.sides_px, out);
   return out;

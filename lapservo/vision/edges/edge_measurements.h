@@ -5,6 +5,7 @@
 
 #include "lapservo/core/inplace_vector.h"
 #include "lapservo/vision/edges/edge_blur.h"
+#include "lapservo/vision/edges/film_edge.h"
 #include "lapservo/vision/image/light_image.h"
 #include "lapservo/vision/shaft/scene.h"
 #include "lapservo/vision/shaft/shaft_pose.h"
@@ -20,25 +21,25 @@ struct EdgeLimits {
   double single_floor_px = 0.016, side_floor_px = 0.09;
   double interpolation_noise = 1.6;        ///< of the variance: interpolated samples are smoother than pixels are noisy
   double blurred_ambient_fraction = 0.05;  ///< of the light on the shaft, the even part
-  /// Lines end so many blurs before a side, of which the blur would mix the outside in, and no nearer to the middle.
-  double blurs_from_side = 2.5, least_line_reach = 0.6;
-  double min_normal_cosine = 0.3;  ///< between the boundary's normal and the line that is sampled
-  double max_side_sigma_px = 2;    ///< a side less certain says nothing
-  std::size_t min_alike = 3;       ///< points whose colours agree, for what a boundary's change of light is
-  std::size_t min_side_edges = 4;  ///< for how noisy a side is
+  double blur_reach = 2.5;                 ///< blurs: so far about an edge light is not what it is beside it
+  double least_line_reach = 0.6;           ///< lines end blur_reach before a side, but no nearer to the middle
+  double min_normal_cosine = 0.3;          ///< between the boundary's normal and the line that is sampled
+  double max_side_sigma_px = 2;            ///< a side less certain says nothing
+  std::size_t min_alike = 3;               ///< points whose colours agree, for what a boundary's change of light is
+  std::size_t min_side_edges = 4;          ///< for how noisy a side is
 
   /// A change of light is the boundary's when it is at least this fraction of what most have, and its direction in the
   /// three channels this alike (cosine squared).
   float min_step = 0.25F, least_alike = 0.7F;
   /// And what it leaves at most this fraction of it (squared), beyond what all leave.
   float max_residual = 0.05F;
-  int max_residual_variances = 9;  ///< of the typical variance: three sigma
+  int max_residual_sigmas = 3;  ///< of the typical residuals
 
   /// One sigma of what the film moves a point by: this fraction of its square, by the blur. At the true pose (60
   /// frames, leaning by up to 60 degrees) 0.01 px are left where it is 0.3 px, 0.05 where it is 0.5, 0.06 where it is
   /// 0.9.
   double film_doubt = 0.3;
-  double seam_blurs = 2.5, seam_px = 1.5;  ///< boundaries that jump at the seam, this near to it, are left out
+  double seam_px = 1.5;  ///< boundaries that jump at the seam, by this and blur_reach near to it, are left out
 };
 inline constexpr EdgeLimits edge_limits;
 
@@ -74,7 +75,7 @@ struct Effort {
 
 /// Everything that a frame shows of a marker's boundaries and of its shaft's sides near a pose.
 struct EdgeMeasurements {
-  static constexpr int max_lines = 64, max_stations = 24;
+  static constexpr int max_lines = max_end_points, max_stations = 24;
   static constexpr std::size_t most = 4 * max_lines + 2 * max_stations;
   InplaceVector<Measurement, most> all;
   std::array<int, 4> in_image{};  ///< lines on which the boundary lies inside the image and off the seam

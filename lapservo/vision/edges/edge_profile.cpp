@@ -18,22 +18,11 @@ struct Basis {
   std::array<std::array<float, EdgeProfile::max_samples>, Shapes> value, by_position, by_blur;
 };
 
-Basis<1> step_basis(const EdgeProfile& profile, float edge_px, float blur_px) {
-  Basis<1> basis;
-  const BlurredEdges& edges = BlurredEdges::instance();
-  for (std::size_t i = 0; i < profile.count; ++i) {
-    const float u = (profile.first_px + static_cast<float>(i) - edge_px) / blur_px;
-    const BlurredEdge edge = edges.at(u);
-    basis.value[0][i] = edge.step;
-    basis.by_position[0][i] = -edge.density / blur_px;
-    basis.by_blur[0][i] = -edge.density * u / blur_px;
-  }
-  return basis;
-}
-
-// sqrt(1 - (1 - d/R)^2) = sqrt(2 d / R) (1 - d / 4R - ...): the occluding contour within a third of the radius.
-Basis<2> contour_basis(const EdgeProfile& profile, float edge_px, float blur_px, float radius_px) {
-  Basis<2> basis;
+// One shape: a step. The second one: sqrt(1 - (1 - d/R)^2) = sqrt(2 d / R) (1 - d / 4R - ...), the occluding contour
+// within a third of the radius.
+template <int Shapes>
+Basis<Shapes> basis_at(const EdgeProfile& profile, float edge_px, float blur_px, float radius_px) {
+  Basis<Shapes> basis;
   const BlurredEdges& edges = BlurredEdges::instance();
   const float scale = std::sqrt(2 / radius_px), root_blur = std::sqrt(blur_px);
   for (std::size_t i = 0; i < profile.count; ++i) {
@@ -41,10 +30,13 @@ Basis<2> contour_basis(const EdgeProfile& profile, float edge_px, float blur_px,
     const BlurredEdge edge = edges.at(u);
     basis.value[0][i] = edge.step;
     basis.by_position[0][i] = -edge.density / blur_px;
-    basis.value[1][i] = scale * root_blur * (edge.root - blur_px * edge.three_halves / (4 * radius_px));
-    basis.by_position[1][i] = -scale / root_blur * (edge.root_slope - blur_px * 1.5F * edge.root / (4 * radius_px));
     basis.by_blur[0][i] = -edge.density * u / blur_px;
-    basis.by_blur[1][i] = scale / root_blur * (0.5F * edge.root - u * edge.root_slope);
+    if constexpr (Shapes == 2) {
+      basis.value[1][i] = scale * root_blur * (edge.root - blur_px * edge.three_halves / (4 * radius_px));
+      basis.by_position[1][i] =
+          -scale / root_blur * (edge.root_slope - blur_px * (3.0F / 2) * edge.root / (4 * radius_px));
+      basis.by_blur[1][i] = scale / root_blur * (0.5F * edge.root - u * edge.root_slope);
+    }
   }
   return basis;
 }
@@ -149,20 +141,18 @@ EdgeFit project(const EdgeProfile& profile, const Basis<Shapes>& basis) {
   return fit;
 }
 
-template <typename MakeBasis>
-EdgeFit iterate(const EdgeProfile& profile, int iterations, const MakeBasis& basis_at) {
+template <int Shapes>
+EdgeFit iterate(const EdgeProfile& profile, float blur_px, float radius_px, int iterations) {
   float edge_px = 0;
   EdgeFit fit;
   const float reach_px = static_cast<float>(profile.count) / 2;
   for (int iteration = 0; iteration < iterations; ++iteration) {
-    fit = project(profile, basis_at(edge_px));
+    fit = project(profile, basis_at<Shapes>(profile, edge_px, blur_px, radius_px));
     if (!fit.converged) return fit;
     const float step_px = std::clamp(fit.offset_px, -2.0F, 2.0F);
     edge_px += step_px;
-    if (std::abs(edge_px) > reach_px) {
-      fit.converged = false;
-      return fit;
-    }
+    fit.converged = std::abs(edge_px) <= reach_px;
+    if (!fit.converged) return fit;
     if (std::abs(step_px) < edge_tolerance_px) break;
   }
   fit.converged = std::abs(fit.offset_px) < (iterations > 1 ? max_last_step_px : max_only_step_px);
@@ -173,12 +163,11 @@ EdgeFit iterate(const EdgeProfile& profile, int iterations, const MakeBasis& bas
 }  // namespace
 
 EdgeFit fit_step(const EdgeProfile& profile, float blur_px, int iterations) {
-  return iterate(profile, iterations, [&](float edge_px) { return step_basis(profile, edge_px, blur_px); });
+  return iterate<1>(profile, blur_px, 1, iterations);
 }
 
 EdgeFit fit_contour(const EdgeProfile& profile, float blur_px, float radius_px, int iterations) {
-  return iterate(profile, iterations,
-                 [&](float edge_px) { return contour_basis(profile, edge_px, blur_px, radius_px); });
+  return iterate<2>(profile, blur_px, radius_px, iterations);
 }
 
 }  // namespace lapservo::internal

@@ -17,14 +17,14 @@ struct FadingLine {
   double off(const FadingPoint& p) const { return p.step - at_zero - slope * p.outside_facing; }
 };
 
-// For the points within three sigma of the line before.
+// For the points that the line before has as inliers.
 FadingLine fading_line(std::span<const FadingPoint> points, const FadingLine& before) {
-  constexpr double inlier_variances = 9, least_spread = 1e-6;
+  constexpr double inlier_sigmas = 3, least_spread = 1e-6;
   double x = 0, y = 0, xx = 0, xy = 0, yy = 0;
   FadingLine line;
   for (const FadingPoint& p : points) {
     const double off = before.off(p);
-    if (off * off > inlier_variances * before.variance) continue;
+    if (off * off > inlier_sigmas * inlier_sigmas * before.variance) continue;
     line.count += 1;
     x += p.outside_facing, y += p.step;
     xx += p.outside_facing * p.outside_facing, xy += p.outside_facing * p.step, yy += p.step * p.step;

@@ -18,17 +18,6 @@ struct PixelBox {
   int u_begin = 0, v_begin = 0, u_end = 0, v_end = 0;
 };
 
-/// At how many pixels of a box four neighbours alternate: the two of one parity both brighter than the two of the
-/// other. Where two fields saw something in two places, columns alternate; noise, texture and compression make columns
-/// and rows alternate alike.
-struct Alternation {
-  int down = 0;    ///< (u, v) to (u, v + 3)
-  int across = 0;  ///< (u, v) to (u + 3, v)
-};
-
-/// In luma, which chroma subsampling spares, where the parities differ by more than `min_gap` levels.
-Alternation luma_alternation(const ImageView& image, const PixelBox& box, std::uint8_t min_gap);
-
 /// Whether two fields are woven in the box that saw something in two places, some pixels apart. Looks at some thousand
 /// pixels, and at all only where those look like fields. Allocates nothing.
 bool is_combed(const ImageView& image, const PixelBox& box);
@@ -46,8 +35,6 @@ class EvenField {
   const cv::Mat& of(const cv::Mat& frame_bgr);
 
  private:
-  std::uint8_t mean(std::uint8_t a, std::uint8_t b) const;
-
   LightTable light_of_value_;
   std::array<std::uint8_t, 16384> value_of_light_{};
   cv::Mat field_bgr_;

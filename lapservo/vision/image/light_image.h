@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 
 #include <Eigen/Core>
 
@@ -40,13 +42,6 @@ class LightImage {
  public:
   LightImage(const ImageView& image, const LightTable& light_of_value, const ChannelGeometry& channels = {})
       : image_(&image), light_(&light_of_value), channels_(channels) {}
-
-  /// The same frame where channels are magnified by so much more.
-  LightImage magnified(const ChromaticAberration& more) const {
-    LightImage out = *this;
-    out.channels_.magnify(more);
-    return out;
-  }
 
   const ImageView& image() const { return *image_; }
   const ChannelGeometry& channels() const { return channels_; }

@@ -1,6 +1,5 @@
 #include "lapservo/vision/model/common_errors.h"
 
-#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <span>

@@ -3,11 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <optional>
 #include <span>
 #include <utility>
 
-#include "lapservo/vision/camera/camera_look.h"
 #include "lapservo/vision/model/common_errors.h"
 #include "lapservo/vision/model/normal_equations.h"
 #include "lapservo/vision/model/residual_lines.h"
@@ -17,10 +15,6 @@ namespace lapservo::internal {
 namespace {
 
 constexpr int max_passes = 5, most_departures = 2, passes_of_departure = 2;
-
-double robust_weight(const Measurement& m, double residual_px) {
-  return cauchy_weight(residual_px / m.sigma_px, cauchy_scale_sigmas) / (m.sigma_px * m.sigma_px);
-}
 
 // Minimises the robust cost of linearised measurements: iteratively reweighted. `film_prior` is what the film's
 // thickness lies below its expected one, in film_sigma_m.
@@ -32,7 +26,7 @@ UnknownVector solve(std::span<const Measurement> measurements, const std::option
     NormalEquations equations;
     equations.add(UnknownVector::Unit(film_unknown), film_prior, 1);
     for (const Measurement& m : measurements)
-      equations.add(m.row, m.residual_px, robust_weight(m, m.residual_px - m.row.dot(step)));
+      equations.add(m.row, m.residual_px, robust_certainty(m.residual_px - m.row.dot(step), m.sigma_px));
     if (rcm)
       for (const int across : {0, 1}) equations.add(rcm->rows.row(across), rcm->residual[across], 1);
     const UnknownVector next = equations.solve(1e-9), change = next - step;
@@ -65,16 +59,66 @@ struct Change {
   bool sharp() const { return blur_fraction < fine_fit_limits.settled_blur; }
 };
 
+// For an image that looks processed, or unlike any, through the departure.
+bool looks_better(const ProcessingEvidence& as_the_rig_says, const ProcessingEvidence& departed) {
+  if (as_the_rig_says.processing != Processing::found) return as_the_rig_says.processing == Processing::none;
+  return !departed.edges || as_the_rig_says.edges->misfit_without < departed.edges->misfit_without;
+}
+
 // One fit: passes of locating edges and moving there, a look at what the camera did, and the print.
 class Fitter {
  public:
   // `fit` holds what it starts from, and the result.
   Fitter(const Scene& scene, const LightImage& light, FineFit& fit) : scene_(scene), light_(light), fit_(fit) {}
   // Each returns whether to go on; what is known by then is in the result.
-  bool settle();
-  bool see_camera(const Expected& expected);
-  void judge(const Expected& expected);
-  bool settles_by_rcm();
+  bool settle() {
+    auto change = refine(capture);
+    if (change && !(change->settled() && change->sharp())) change = refine(approach);
+    return change && refine_until_settled(1);
+  }
+  bool see_camera(const Expected& expected) {
+    const bool is_blurred_otherwise =
+        expected.blur_px && std::abs(fit_.blur.boundaries_px() / *expected.blur_px - 1) > fine_fit_limits.other_blur;
+    fit_.asked = fit_.asked || expected.ask || is_blurred_otherwise;  // also after other passes
+    for (int i = 0; fit_.asked; ++i) {
+      const CameraDeparture departure = look_at_camera();
+      const bool as_known = departure.moves_alike(fit_.departure);
+      if (as_known || i < most_departures) fit_.departure = departure;
+      if (as_known || i == most_departures) break;
+      if (!refine_until_settled(passes_of_departure)) return false;
+    }
+    if (fit_.processing == Processing::unknown) fit_.bias_px = expected.bias_px;
+    if (processed_) take_processing_off(*processed_);
+    return true;
+  }
+  void judge(const Expected& expected) {
+    fit_.lines = pass_.lines;
+    fit_.in_image = pass_.in_image;
+    fit_.sides_in_image = pass_.sides_in_image;
+    const ResidualLines lines = residual_lines(pass_.all);
+    const auto tau_rad = facing_tau_rad(scene_.marker, fit_.unknowns.pose());
+    const bool is_known = tau_rad && scene_.known_sides[print_side(*tau_rad)];
+    count_inliers();
+    std::optional<RcmBesideFit> beside;
+    if (const auto measurement = rcm())
+      beside = RcmBesideFit{*measurement, fit_.unknowns.through_rcm(), fit_.is_well_seen()};
+    const auto print = fit_print(pass_.all, lines, beside, film_prior(), scene_.marker, is_known, errors_of(lines));
+    if (!print) return;
+    settled_ = fit_.unknowns;
+    fit_.unknowns = fit_.unknowns.with_rcm(print->through_rcm);
+    fit_.as_the_rig_says = fit_.unknowns.changed_by(print->step_as_the_rig_says.head<pose_unknowns>());
+    fit_.unknowns = fit_.unknowns.changed_by(print->step.head<pose_unknowns>());
+    count_inliers();
+    tell(*print);
+    count_turn(expected);
+  }
+  bool settles_by_rcm() {
+    const bool through_rcm = fit_.unknowns.through_rcm();
+    if (!fit_.converged || settled_.through_rcm() == through_rcm) return false;
+    fit_.unknowns = settled_.with_rcm(through_rcm);
+    fit_.converged = false;
+    return refine_until_settled(1);
+  }
 
  private:
   static constexpr Effort capture{5, 5, 3, 3}, approach{4, 4, 6, 3}, measure_all{2, 0, 1, 1};
@@ -84,19 +128,143 @@ class Fitter {
     if (!scene_.registration) return std::nullopt;
     return scene_.registration->of(fit_.unknowns.pose(), fine_fit_limits.least_rcm_sigma_m);
   }
-  int unheld_unknowns() const { return fit_.unknowns.through_rcm() ? pose_unknowns - 2 : pose_unknowns; }
   double film_prior() const { return (film_mean_m - film_m_) / film_sigma_m; }
-  double move();
-  Change take_blur(const EdgeBlur& improved);
-  std::optional<Change> refine(const Effort& effort);
-  bool refine_until_settled(int least_passes);
-  bool is_blurred_otherwise(const Expected& expected) const;
-  void take_processing_off(const ProcessedEdges& edges);
-  std::array<double, 4> departure_px() const;
-  CommonErrors errors_of(const ResidualLines& lines) const;
-  void count_inliers();
-  void tell(const PrintFit& print);
-  void count_turn(const Expected& expected);
+  double move() {
+    const UnknownVector step = solve(pass_.all, fit_.unknowns.through_rcm() ? rcm() : std::nullopt, film_prior());
+    double farthest_px = 0;
+    for (Measurement& m : pass_.all) {
+      const double shift_px = m.row.dot(step);
+      m.residual_px -= shift_px;
+      m.expected_px += static_cast<float>(shift_px) * m.normal;
+      farthest_px = std::max(farthest_px, std::abs(shift_px));
+    }
+    fit_.unknowns = fit_.unknowns.changed_by(step.head<pose_unknowns>());
+    film_m_ = std::clamp(film_m_ + step[film_unknown] * film_sigma_m, 0.0, film_mean_m + 4 * film_sigma_m);
+    return farthest_px;
+  }
+  Change take_blur(const EdgeBlur& improved) {
+    Change change;
+    const EdgeBlur& before = fit_.blur;
+    for (std::size_t k = 0; k < 4; ++k) {
+      change.add_blur(before.along_px[k], improved.along_px[k]);
+      const double oblique_px2 = improved.ellipse(k).oblique_px2 - before.ellipse(k).oblique_px2;
+      change.oblique_px2 = std::max(change.oblique_px2, std::abs(oblique_px2));
+    }
+    change.add_blur(before.sides_px, improved.sides_px);
+    fit_.blur = improved;
+    return change;
+  }
+  std::optional<Change> refine(const Effort& effort) {
+    ++fit_.passes;
+    located_with_ = fit_.blur;
+    const DepartedLight seen(light_, fit_.departure);
+    pass_ = measure_edges(scene_, seen.light(), fit_.unknowns, film_m_, effort, located_with_);
+    const int unheld = fit_.unknowns.through_rcm() ? pose_unknowns - 2 : pose_unknowns;
+    if (static_cast<int>(pass_.all.size()) < 2 * unheld) return std::nullopt;
+    const double moved_px = move();
+    Change change = take_blur(pass_.improved(fit_.blur));
+    change.points_px = moved_px;
+    if (!fit_.unknowns.pose().camera_from_unrolled.translation.allFinite()) return std::nullopt;
+    return change;
+  }
+  bool refine_until_settled(int least_passes) {
+    bool settled = false;
+    for (int i = 1; i <= max_passes; ++i) {
+      const auto change = refine(measure_all);
+      if (!change) return false;
+      settled = change->settled();
+      if (i >= least_passes && settled && change->ellipse_settled()) break;
+    }
+    return settled;
+  }
+  ProcessingEvidence processing_in(const LightImage& light, const PooledEdges& glance) {
+    ProcessingEvidence evidence = find_processing(light, pass_.all, glance, located_with_.boundaries_px());
+    fit_.processing_explained += evidence.explained;
+    return evidence;
+  }
+  // The camera's departure from the rig's, as far as it is known by its processing of the image as that looks when the
+  // known one is undone. One is accepted if the image looks unprocessed without it: processing moves channels apart,
+  // too. One that an earlier frame showed is withdrawn by an image that looks better with it in.
+  CameraDeparture look_at_camera() {
+    const CameraDeparture known = fit_.departure;
+    fit_.processing = Processing::unknown, processed_.reset();
+    if (located_with_.boundaries_px() > processing_limits.max_blur_px) return known;
+    const DepartedLight seen(light_, known);
+    const PooledEdges glance = glance_at(seen.light(), pass_.all);
+    ProcessingEvidence evidence = processing_in(seen.light(), glance);
+    fit_.processing = evidence.processing;
+    const bool is_withdrawn = fit_.processing != Processing::none && known.any() &&
+                              looks_better(processing_in(light_, glance_at(light_, pass_.all)), evidence);
+    processed_ = std::move(evidence.edges);
+    if (is_withdrawn) return {};
+    if (fit_.processing == Processing::found) return known;
+    ++fit_.asked_for_departure;
+    const auto more = find_departure(seen.light(), pass_.all, glance, located_with_.boundaries_px());
+    if (!more) return known.any() ? known : CameraDeparture{};  // what was uncertain is certain, where channels agree
+    const auto all = known.then(*more);
+    if (!all || !more->any()) return all.value_or(known);
+    const DepartedLight without(light_, *all);
+    const auto left = processing_in(without.light(), glance_at(without.light(), pass_.all));
+    return left.processing == Processing::none ? *all : known;
+  }
+  void take_processing_off(const ProcessedEdges& edges) {
+    fit_.bias_px = bias_magnitudes_px(edges);
+    for (std::size_t i = 0; i < pass_.all.size(); ++i)
+      pass_.all[i].residual_px -= static_cast<double>(edges.measurement_bias_px[i]);
+    move();
+  }
+  void count_turn(const Expected& expected) {
+    const TurnBlur turn = turn_blur(pass_, located_with_, fit_.processing == Processing::found);
+    const auto change_rad =
+        expected.moved_on ? std::optional(expected.moved_on->change_to(fit_.unknowns)[psi_unknown]) : std::nullopt;
+    fit_.covariance(psi_unknown, psi_unknown) += variance_of_uneven_turn(turn, change_rad);
+    fit_.p_false = std::max(fit_.p_false, p_false_of(0, fit_.psi_variance_rad2()));
+  }
+  CommonErrors errors_of(const ResidualLines& lines) const {
+    CommonErrors errors = common_errors(pass_, lines, fit_.blur, processed_, fit_.bias_px, departure_px());
+    if (!has_sigmas(scene_.camera, scene_.marker)) return errors;
+    std::array<double, 4> by_exponent_px{};
+    // An exponent that the image shows has a sigma of its own.
+    if (scene_.camera.response.sigma && fit_.departure.exponent == 1) {
+      const DepartedLight seen(light_, fit_.departure);
+      by_exponent_px = moved_by_exponent_px(seen.light(), pass_.all, located_with_.boundaries_px());
+    }
+    errors.rig = RigErrors(scene_.camera, scene_.marker, fit_.unknowns.pose(), by_exponent_px);
+    return errors;
+  }
+  std::array<double, 4> departure_px() const {
+    std::array<double, 4> radial_px{}, doubt_px{};
+    if (!fit_.departure.doubted()) return doubt_px;
+    const ChannelGeometry& channels = light_.channels();
+    const Eigen::Vector2f centre(channels.centre_u, channels.centre_v);
+    std::array<int, 4> places{};
+    for (const Measurement& m : pass_.all) {
+      if (m.group >= 4) continue;
+      radial_px[m.group] += static_cast<double>((m.expected_px - centre).dot(m.normal)), ++places[m.group];
+    }
+    for (std::size_t k = 0; k < 4; ++k) doubt_px[k] = fit_.departure.doubt_px(k, radial_px[k] / std::max(1, places[k]));
+    return doubt_px;
+  }
+  void count_inliers() {
+    fit_.used.fill(0), fit_.sides_used = 0;
+    double squares = 0;
+    int inliers = 0;
+    for (const Measurement& m : pass_.all) {
+      const double sigmas = std::abs(m.residual_px) / std::hypot(m.sigma_px, fine_fit_limits.tolerated_px);
+      if (sigmas > inlier_sigmas) continue;
+      m.group < 4 ? ++fit_.used[m.group] : ++fit_.sides_used;
+      if (m.group < 4) squares += sigmas * sigmas, ++inliers;
+    }
+    fit_.inlier_rms_sigmas = inliers ? std::sqrt(squares / inliers) : 0;
+  }
+  void tell(const PrintFit& print) {
+    if (scene_.registration) fit_.with_registration = print.by_rcm_m * scene_.registration->covariance.topRows<3>();
+    fit_.covariance = print.covariance;
+    fit_.off_probability = print.off_probability;
+    fit_.p_false = print.p_false, fit_.p_false_by_tolerance = print.p_false_by_tolerance;
+    fit_.psi_variance_by_tolerance = print.psi_variance_by_tolerance;
+    fit_.converged = true;
+  }
 
   const Scene& scene_;
   const LightImage& light_;
@@ -107,183 +275,6 @@ class Fitter {
   EdgeBlur located_with_;
   std::optional<ProcessedEdges> processed_;
 };
-
-// To where the measurements are; how far the farthest of them moved [px].
-double Fitter::move() {
-  const UnknownVector step = solve(pass_.all, fit_.unknowns.through_rcm() ? rcm() : std::nullopt, film_prior());
-  double farthest_px = 0;
-  for (Measurement& m : pass_.all) {
-    const double shift_px = m.row.dot(step);
-    m.residual_px -= shift_px;
-    m.expected_px += static_cast<float>(shift_px) * m.normal;
-    farthest_px = std::max(farthest_px, std::abs(shift_px));
-  }
-  fit_.unknowns = fit_.unknowns.changed_by(step.head<pose_unknowns>());
-  film_m_ = std::clamp(film_m_ + step[film_unknown] * film_sigma_m, 0.0, film_mean_m + 4 * film_sigma_m);
-  return farthest_px;
-}
-
-Change Fitter::take_blur(const EdgeBlur& improved) {
-  Change change;
-  const EdgeBlur& before = fit_.blur;
-  for (std::size_t k = 0; k < 4; ++k) {
-    change.add_blur(before.along_px[k], improved.along_px[k]);
-    const double oblique_px2 = improved.ellipse(k).oblique_px2 - before.ellipse(k).oblique_px2;
-    change.oblique_px2 = std::max(change.oblique_px2, std::abs(oblique_px2));
-  }
-  change.add_blur(before.sides_px, improved.sides_px);
-  fit_.blur = improved;
-  return change;
-}
-
-// Nullopt when too little was seen.
-std::optional<Change> Fitter::refine(const Effort& effort) {
-  ++fit_.passes;
-  located_with_ = fit_.blur;
-  const DepartedLight seen(light_, fit_.departure);
-  pass_ = measure_edges(scene_, seen.light(), fit_.unknowns, film_m_, effort, located_with_);
-  if (static_cast<int>(pass_.all.size()) < 2 * unheld_unknowns()) return std::nullopt;
-  const double moved_px = move();
-  Change change = take_blur(pass_.improved(fit_.blur));
-  change.points_px = moved_px;
-  if (!fit_.unknowns.pose().camera_from_unrolled.translation.allFinite()) return std::nullopt;
-  return change;
-}
-
-bool Fitter::settle() {
-  auto change = refine(capture);
-  if (change && !(change->settled() && change->sharp())) change = refine(approach);
-  return change && refine_until_settled(1);
-}
-
-bool Fitter::refine_until_settled(int least_passes) {
-  bool settled = false;
-  for (int i = 1; i <= max_passes; ++i) {
-    const auto change = refine(measure_all);
-    if (!change) return false;
-    settled = change->settled();
-    if (i >= least_passes && settled && change->ellipse_settled()) break;
-  }
-  return settled;
-}
-
-bool Fitter::is_blurred_otherwise(const Expected& expected) const {
-  return expected.blur_px && std::abs(fit_.blur.boundaries_px() / *expected.blur_px - 1) > fine_fit_limits.other_blur;
-}
-
-bool Fitter::see_camera(const Expected& expected) {
-  fit_.asked = fit_.asked || expected.ask || is_blurred_otherwise(expected);  // also after other passes
-  for (int i = 0; fit_.asked; ++i) {
-    SeenCamera camera = look_at_camera(light_, pass_.all, located_with_.boundaries_px(), fit_.departure);
-    fit_.processing = camera.evidence.processing;
-    processed_ = std::move(camera.evidence.edges);
-    fit_.processing_explained += camera.explained, fit_.asked_for_departure += camera.asked_for_departure;
-    const bool as_known = camera.departure.moves_alike(fit_.departure);
-    if (as_known || i < most_departures) fit_.departure = camera.departure;
-    if (as_known || i == most_departures) break;
-    if (!refine_until_settled(passes_of_departure)) return false;
-  }
-  if (fit_.processing == Processing::unknown) fit_.bias_px = expected.bias_px;
-  if (processed_) take_processing_off(*processed_);
-  return true;
-}
-
-void Fitter::take_processing_off(const ProcessedEdges& edges) {
-  fit_.bias_px = bias_magnitudes_px(edges);
-  for (std::size_t i = 0; i < pass_.all.size(); ++i)
-    pass_.all[i].residual_px -= static_cast<double>(edges.measurement_bias_px[i]);
-  move();
-}
-
-void Fitter::judge(const Expected& expected) {
-  fit_.lines = pass_.lines;
-  fit_.in_image = pass_.in_image;
-  fit_.sides_in_image = pass_.sides_in_image;
-  const ResidualLines lines = residual_lines(pass_.all);
-  const auto tau_rad = facing_tau_rad(scene_.marker, fit_.unknowns.pose());
-  const bool is_known = tau_rad && scene_.known_sides[print_side(*tau_rad)];
-  count_inliers();
-  std::optional<RcmBesideFit> beside;
-  if (const auto measurement = rcm())
-    beside = RcmBesideFit{*measurement, fit_.unknowns.through_rcm(), fit_.is_well_seen()};
-  const auto print = fit_print(pass_.all, lines, beside, film_prior(), scene_.marker, is_known, errors_of(lines));
-  if (!print) return;
-  settled_ = fit_.unknowns;
-  fit_.unknowns = fit_.unknowns.with_rcm(print->through_rcm);
-  fit_.as_the_rig_says = fit_.unknowns.changed_by(print->step_as_the_rig_says.head<pose_unknowns>());
-  fit_.unknowns = fit_.unknowns.changed_by(print->step.head<pose_unknowns>());
-  count_inliers();
-  tell(*print);
-  count_turn(expected);
-}
-
-// The part of sigma by a turn within the exposure.
-void Fitter::count_turn(const Expected& expected) {
-  const TurnBlur turn = turn_blur(pass_, located_with_, fit_.processing == Processing::found);
-  const auto change_rad =
-      expected.moved_on ? std::optional(expected.moved_on->change_to(fit_.unknowns)[psi_unknown]) : std::nullopt;
-  fit_.covariance(psi_unknown, psi_unknown) += variance_of_uneven_turn(turn, change_rad);
-  fit_.p_false = std::max(fit_.p_false, p_false_of(0, fit_.psi_variance_rad2()));
-}
-
-CommonErrors Fitter::errors_of(const ResidualLines& lines) const {
-  CommonErrors errors = common_errors(pass_, lines, fit_.blur, processed_, fit_.bias_px, departure_px());
-  if (!has_sigmas(scene_.camera, scene_.marker)) return errors;
-  std::array<double, 4> by_exponent_px{};
-  // An exponent that the image shows has a sigma of its own.
-  if (scene_.camera.response.sigma && fit_.departure.exponent == 1) {
-    const DepartedLight seen(light_, fit_.departure);
-    by_exponent_px = moved_by_exponent_px(seen.light(), pass_.all, located_with_.boundaries_px());
-  }
-  errors.rig = RigErrors(scene_.camera, scene_.marker, fit_.unknowns.pose(), by_exponent_px);
-  return errors;
-}
-
-// By how much what is left of the departure may move each boundary.
-std::array<double, 4> Fitter::departure_px() const {
-  std::array<double, 4> radial_px{}, doubt_px{};
-  if (!fit_.departure.doubted()) return doubt_px;
-  const ChannelGeometry& channels = light_.channels();
-  const Eigen::Vector2f centre(channels.centre_u, channels.centre_v);
-  std::array<int, 4> places{};
-  for (const Measurement& m : pass_.all) {
-    if (m.group >= 4) continue;
-    radial_px[m.group] += static_cast<double>((m.expected_px - centre).dot(m.normal)), ++places[m.group];
-  }
-  for (std::size_t k = 0; k < 4; ++k) doubt_px[k] = fit_.departure.doubt_px(k, radial_px[k] / std::max(1, places[k]));
-  return doubt_px;
-}
-
-// Passes that held the shaft at an RCM which lies elsewhere, or not at one that does not, ended elsewhere.
-bool Fitter::settles_by_rcm() {
-  const bool through_rcm = fit_.unknowns.through_rcm();
-  if (!fit_.converged || settled_.through_rcm() == through_rcm) return false;
-  fit_.unknowns = settled_.with_rcm(through_rcm);
-  fit_.converged = false;
-  return refine_until_settled(1);
-}
-
-void Fitter::count_inliers() {
-  fit_.used.fill(0), fit_.sides_used = 0;
-  double squares = 0;
-  int inliers = 0;
-  for (const Measurement& m : pass_.all) {
-    const double sigmas = std::abs(m.residual_px) / std::hypot(m.sigma_px, fine_fit_limits.tolerated_px);
-    if (sigmas > inlier_sigmas) continue;
-    m.group < 4 ? ++fit_.used[m.group] : ++fit_.sides_used;
-    if (m.group < 4) squares += sigmas * sigmas, ++inliers;
-  }
-  fit_.inlier_rms_sigmas = inliers ? std::sqrt(squares / inliers) : 0;
-}
-
-void Fitter::tell(const PrintFit& print) {
-  if (scene_.registration) fit_.with_registration = print.by_rcm_m * scene_.registration->covariance.topRows<3>();
-  fit_.covariance = print.covariance;
-  fit_.off_probability = print.off_probability;
-  fit_.p_false = print.p_false, fit_.p_false_by_tolerance = print.p_false_by_tolerance;
-  fit_.psi_variance_by_tolerance = print.psi_variance_by_tolerance;
-  fit_.converged = true;
-}
 
 }  // namespace
 

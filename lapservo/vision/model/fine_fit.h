@@ -18,15 +18,14 @@ struct FineFitLimits {
   /// How far a point may be off beside its noise and still agree with the fit: edges of blood beside a boundary move
   /// it.
   double tolerated_px = 0.037;
-  double settled_px = 1.5;    ///< a pass that moves no point farther is the last
-  double settled_blur = 0.1;  ///< change of the blur, a fraction of it, below which edges need not be located again
-  double motion_blur_weight =
-      5;  ///< a motion blur's change by that of a point: motion's may be no blur, and never settles
+  double settled_px = 1.5;        ///< a pass that moves no point farther is the last
+  double settled_blur = 0.1;      ///< change of the blur, a fraction of it, below which edges need not be located again
+  double motion_blur_weight = 5;  ///< of its change by that of a point: motion's may be no blur, and never settles
   double settled_oblique_px2 = 0.3;  ///< of a blur's covariance, which moves boundaries by a twentieth of it in px
   double sharp_blur_px = 1.8;        ///< a blur below it may flicker where few sides are left
   double settled_sigmas = 0.01;      ///< a reweighting that moves the unknowns by less is the last
   double other_blur = 0.05;          ///< a change of the mean blur from one frame to the next, a fraction of it
-  double well_seen_fraction = 0.7;   ///< of the boundary points, to blame the print or the registration
+  double well_seen_fraction = 0.7;   ///< of the boundary points, to blame the print or the registration; of one's lines
   double least_rcm_sigma_m = 1e-7;   ///< of an exact registration: a hundredth of what images show
 };
 inline constexpr FineFitLimits fine_fit_limits;

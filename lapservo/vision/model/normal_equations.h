@@ -3,8 +3,6 @@
 #include <array>
 #include <optional>
 
-#include <Eigen/Core>
-
 #include "lapservo/vision/shaft/shaft_pose.h"
 
 namespace lapservo::internal {
@@ -41,6 +39,11 @@ inline constexpr double cauchy_scale_sigmas = 2.5, inlier_sigmas = 5;
 inline double cauchy_weight(double residual_sigmas, double scale_sigmas) {
   const double x = residual_sigmas / scale_sigmas;
   return 1 / (1 + x * x);
+}
+
+/// 1 / sigma^2 of a residual, less of outliers.
+inline double robust_certainty(double residual, double sigma) {
+  return cauchy_weight(residual / sigma, cauchy_scale_sigmas) / (sigma * sigma);
 }
 
 }  // namespace lapservo::internal

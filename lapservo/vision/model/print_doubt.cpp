@@ -10,13 +10,13 @@ namespace {
 // Where the boundaries lie at both edges of the print.
 PrintVector places_mm(const Marker& marker) {
   const auto at_upper_m = boundaries_m(marker, 0), slopes_m = boundary_slopes_m(marker);
-  PrintVector places;
+  PrintVector places_m;
   for (std::size_t k = 0; k < errors_of_boundary.size(); ++k) {
     const auto [upper, lower] = errors_of_boundary[k];
-    places[lower] = 1e3 * (at_upper_m[k] + marker.covered_rad() * slopes_m[k]);
-    places[upper] = 1e3 * at_upper_m[k];
+    places_m[lower] = at_upper_m[k] + marker.covered_rad() * slopes_m[k];
+    places_m[upper] = at_upper_m[k];
   }
-  return places;
+  return 1e3 * places_m;
 }
 
 // A boundary that leans about the middle of what shows of it.

@@ -74,7 +74,7 @@ GroupPull gathered(const Products& products, std::size_t group, PrintEquations& 
   return pull;
 }
 
-double robust_certainty(const Measurement& m, const ResidualLines& lines, const CommonErrors& errors) {
+double certainty_about(const Measurement& m, const ResidualLines& lines, const CommonErrors& errors) {
   const double sigmas = lines[m.group].residual_px(m) / m.sigma_px, noise_px = errors.noise_scale(m) * m.sigma_px;
   return cauchy_weight(sigmas, cauchy_scale_sigmas) / (noise_px * noise_px);
 }
@@ -88,15 +88,11 @@ void add_pulls_of_all(std::span<const Measurement> measurements, const ResidualL
   double all = 0;
   for (const Measurement& m : measurements) {
     if (m.group >= errors_of_boundary.size()) continue;
-    const double weight = robust_certainty(m, lines, errors);
-    const auto& edges = errors_of_boundary[m.group];
-    const Eigen::Vector2d by_print = print_row(m);
+    const double weight = certainty_about(m, lines, errors);
     const std::array<double, 3> moved{1, m.across, m.across * m.across - 1.0 / 3};
     for (std::size_t i = 0; i < pulls.size(); ++i) {
       const double part = weight * moved[i];
-      pulls[i].x += part * m.row;
-      for (std::size_t edge = 0; edge < 2; ++edge)
-        pulls[i].n[edges[edge]] += part * by_print[static_cast<Eigen::Index>(edge)];
+      pulls[i].add(m, part);
       squares[i] += part * moved[i];
     }
     all += weight;
@@ -113,16 +109,11 @@ void add_pulls_of_camera(std::span<const Measurement> measurements, const Residu
                          const CommonErrors& errors, PrintSums& sums) {
   std::array<CameraPull, RigErrors::most> pulls;
   for (const Measurement& m : measurements) {
-    const RigErrors::Shifts shifts = robust_certainty(m, lines, errors) * errors.rig.of(m);
-    const Eigen::Vector2d by_print = m.group < errors_of_boundary.size() ? print_row(m) : Eigen::Vector2d::Zero();
+    const RigErrors::Shifts shifts = certainty_about(m, lines, errors) * errors.rig.of(m);
     for (int i = 0; i < RigErrors::most; ++i) {
       CameraPull& pull = pulls[static_cast<std::size_t>(i)];
-      pull.x += shifts[i] * m.row;
+      pull.add(m, shifts[i]);
       pull.by_group[m.group] += shifts[i];
-      if (m.group >= errors_of_boundary.size()) continue;
-      const auto& edges = errors_of_boundary[m.group];
-      for (std::size_t edge = 0; edge < 2; ++edge)
-        pull.n[edges[edge]] += shifts[i] * by_print[static_cast<Eigen::Index>(edge)];
     }
   }
   for (CameraPull& pull : pulls) {
@@ -131,32 +122,6 @@ void add_pulls_of_camera(std::span<const Measurement> measurements, const Residu
     sums.camera.push_back(pull);
   }
 }
-
-}  // namespace
-
-PrintSums print_sums(std::span<const Measurement> measurements, const ResidualLines& lines, double film_prior,
-                     const CommonErrors& errors) {
-  std::array<Products, measurement_groups> products;
-  for (const Measurement& m : measurements) products[m.group].add(m, robust_certainty(m, lines, errors));
-  PrintSums sums;
-  for (std::size_t group = 0; group < measurement_groups; ++group) {
-    sums.pulls[group] = gathered(products[group], group, sums.equations);
-    sums.pulls[group].error_px = errors.px[group];
-  }
-  sums.equations.add(UnknownVector::Unit(film_unknown), PrintVector::Zero(), 1, film_prior);
-  if (errors.whole_px > 0 || errors.leaning_px > 0 || errors.bowed_px > 0)
-    add_pulls_of_all(measurements, lines, errors, sums);
-  if (errors.rig.any()) add_pulls_of_camera(measurements, lines, errors, sums);
-  return sums;
-}
-
-PrintSums held(PrintSums sums, const RcmMeasurement& rcm) {
-  sums.equations.xx += rcm.rows.transpose() * rcm.rows;
-  sums.equations.x += rcm.rows.transpose() * rcm.residual;
-  return sums;
-}
-
-namespace {
 
 double certainty_of(const GroupPull& group) {
   return 1 / (group.weight + 1 / (group.error_px * group.error_px));
@@ -188,6 +153,28 @@ InplaceVector<PrintVector, RigErrors::most> shapes_of_camera(const PrintInformat
 }
 
 }  // namespace
+
+PrintSums print_sums(std::span<const Measurement> measurements, const ResidualLines& lines, double film_prior,
+                     const CommonErrors& errors) {
+  std::array<Products, measurement_groups> products;
+  for (const Measurement& m : measurements) products[m.group].add(m, certainty_about(m, lines, errors));
+  PrintSums sums;
+  for (std::size_t group = 0; group < measurement_groups; ++group) {
+    sums.pulls[group] = gathered(products[group], group, sums.equations);
+    sums.pulls[group].error_px = errors.px[group];
+  }
+  sums.equations.add(UnknownVector::Unit(film_unknown), PrintVector::Zero(), 1, film_prior);
+  if (errors.whole_px > 0 || errors.leaning_px > 0 || errors.bowed_px > 0)
+    add_pulls_of_all(measurements, lines, errors, sums);
+  if (errors.rig.any()) add_pulls_of_camera(measurements, lines, errors, sums);
+  return sums;
+}
+
+PrintSums held(PrintSums sums, const RcmMeasurement& rcm) {
+  sums.equations.xx += rcm.rows.transpose() * rcm.rows;
+  sums.equations.x += rcm.rows.transpose() * rcm.residual;
+  return sums;
+}
 
 std::optional<PrintInformation> information_of(const PrintSums& sums) {
   PrintEquations e = sums.equations;

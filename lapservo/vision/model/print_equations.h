@@ -48,6 +48,14 @@ struct GroupPull {
   UnknownVector x = UnknownVector::Zero();
   PrintVector n = PrintVector::Zero();
   double weight = 0, residual = 0, error_px = 0;
+
+  /// Adds a part of a measurement's rows.
+  void add(const Measurement& m, double part) {
+    x += part * m.row;
+    if (m.group >= errors_of_boundary.size()) return;
+    const Eigen::Vector2d by_print = print_row(m);
+    for (const int edge : {0, 1}) n[errors_of_boundary[m.group][edge]] += part * by_print[edge];
+  }
 };
 
 /// The effect of one sigma of a number of the rig's camera on the measurements of all groups.

@@ -25,7 +25,7 @@ struct PrintPrior {
 };
 
 /// The covariance of the print's errors that a prior and the information, in which no boundary has to do with another,
-/// leave [mm^2]. Bands are taken to be off by a nanometre at least, by a micrometre where the ink lies aside.
+/// leave [mm^2]. Bands are taken to be off by a picometre at least, by a micrometre where the ink lies aside.
 PrintMatrix covariance_of(const PrintMatrix& information_by_boundary, const PrintPrior& prior);
 
 /// How likely residuals make prints of any size of errors.

@@ -1,9 +1,7 @@
 #include "lapservo/vision/model/print_fit.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstddef>
 
 #include "lapservo/core/inplace_vector.h"
 #include "lapservo/vision/model/print_equations.h"
@@ -14,12 +12,6 @@ namespace lapservo::internal {
 namespace {
 
 constexpr const PrintLimits& limits = print_limits;
-
-PrintShapes doubted_shapes_mm(const PrintDoubt& doubt, const PrintSums& sums, const Marker& marker) {
-  std::array<double, 4> weights{};
-  for (std::size_t k = 0; k < weights.size(); ++k) weights[k] = sums.pulls[k].weight;
-  return shapes_of(doubt, sums.equations.nn, weights, marker);
-}
 
 // A size of errors beyond the tolerance, and how likely it is.
 struct Hypothesis {
@@ -69,7 +61,6 @@ Hypotheses weighted(Hypotheses all, const PrintInformation& evidence) {
   return all;
 }
 
-// Weighted solutions as one.
 class Mixture {
  public:
   void add(const PrintSolution& solution, double weight) {
@@ -114,7 +105,10 @@ std::optional<Judgement> judged(const PrintSums& sums, const Hypotheses& prior, 
   if (!as_the_rig_says) return std::nullopt;
   // Nothing, where the frame shows nothing of the print.
   const PrintInformation print = information_of(sums).value_or(PrintInformation{});
-  Judgement out{weighted(prior, doubted(print, doubted_shapes_mm(doubt, sums, marker))), *as_the_rig_says, {}};
+  std::array<double, 4> weights{};
+  for (std::size_t k = 0; k < weights.size(); ++k) weights[k] = sums.pulls[k].weight;
+  const PrintShapes shapes_mm = shapes_of(doubt, sums.equations.nn, weights, marker);
+  Judgement out{weighted(prior, doubted(print, shapes_mm)), *as_the_rig_says, {}};
   out.mixture.add(*as_the_rig_says, out.all[0].weight);
   for (std::size_t i = 1; i < out.all.size(); ++i) {
     if (out.all[i].weight < limits.min_weight) continue;
@@ -123,13 +117,6 @@ std::optional<Judgement> judged(const PrintSums& sums, const Hypotheses& prior, 
     out.mixture.add(*off, out.all[i].weight);
   }
   return out;
-}
-
-double off_probability(const Hypotheses& all) {
-  double sum = 0;
-  for (const Hypothesis& hypothesis : all)
-    if (hypothesis.is_off) sum += hypothesis.weight;
-  return sum;
 }
 
 // By how many sigmas of both the shaft at `step` misses the RCM.
@@ -187,7 +174,8 @@ std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const Res
     fit.by_rcm_m = (print->as_the_rig_says.inverse * rcm->measurement.rows.transpose() * rcm->measurement.by_rcm_m)
                        .topRows<pose_unknowns>();
   const auto psi_variance = [](const PrintSolution& s) { return s.covariance(psi_unknown, psi_unknown); };
-  fit.off_probability = off_probability(print->all);
+  for (const Hypothesis& hypothesis : print->all)
+    if (hypothesis.is_off) fit.off_probability += hypothesis.weight;
   fit.p_false = print->mixture.p_false();
   fit.p_false_by_tolerance = p_false_of(0, psi_variance(print->as_the_rig_says)) - p_false_of(0, psi_variance(*exact));
   fit.psi_variance_by_tolerance = psi_variance(print->as_the_rig_says) - psi_variance(*exact);

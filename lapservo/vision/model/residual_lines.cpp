@@ -35,8 +35,7 @@ ResidualLine line_of(std::span<const Measurement> measurements, std::size_t grou
   for (int i = 0; i < iterations; ++i) {
     double sum = 0, turns = 0, turns_squared = 1 / (usual_slope * usual_slope), at_start = 0, at_turn = 0;
     for (const LinePoint& p : points) {
-      const double sigmas = (p.value - line.at_start - line.slope * p.turn_fraction) / p.sigma;
-      const double weight = cauchy_weight(sigmas, cauchy_scale_sigmas) / (p.sigma * p.sigma);
+      const double weight = robust_certainty(p.value - line.at_start - line.slope * p.turn_fraction, p.sigma);
       sum += weight;
       turns += weight * p.turn_fraction;
       turns_squared += weight * p.turn_fraction * p.turn_fraction;

@@ -6,13 +6,6 @@
 namespace lapservo::internal {
 namespace {
 
-// One sigma of the exponent by which light may be off: v^(1 + x) differs from v by x v ln(v), by 0.28 x at most beside
-// what another exposure makes of it.
-double sigma_exponent(const Response& response) {
-  constexpr double value_by_exponent = 0.28;
-  return response.sigma.value_or(0) / value_by_exponent;
-}
-
 // The part by which bands are off whose errors add up.
 double common_part(const std::array<double, 3>& bands_m, const std::array<double, 3>& sigmas_m) {
   return std::accumulate(sigmas_m.begin(), sigmas_m.end(), 0.0) / std::accumulate(bands_m.begin(), bands_m.end(), 0.0);
@@ -47,7 +40,11 @@ RigErrors::RigErrors(const Camera& camera, const Marker& marker, const ShaftPose
     along_m_[2][k] = {0, gap_rad * slopes_m[k]};
     along_m_[3][k] = {wider * upper_m[k], wider * lower_m};
   }
-  for (std::size_t k = 0; k < 4; ++k) response_px_[k] = sigma_exponent(camera.response) * by_exponent_px[k];
+  // One sigma of the exponent by which light may be off: v^(1 + x) differs from v by x v ln(v), by 0.28 x at most
+  // beside what another exposure makes of it.
+  constexpr double value_by_exponent = 0.28;
+  const double sigma_exponent = camera.response.sigma.value_or(0) / value_by_exponent;
+  for (std::size_t k = 0; k < 4; ++k) response_px_[k] = sigma_exponent * by_exponent_px[k];
 }
 
 RigErrors::Shifts RigErrors::of(const Measurement& measurement) const {

@@ -18,7 +18,7 @@ namespace lapservo::internal {
 /// (Marker::boundary_sigma_m()).
 class RigErrors {
  public:
-  static constexpr int of_marker = 4, most = 11 + of_marker;
+  static constexpr int of_marker = 4, most = 5 + 5 + 1 + of_marker;  ///< pinhole, distortion, response, marker
   using Shifts = Eigen::Matrix<double, most, 1>;
 
   RigErrors() = default;

@@ -37,19 +37,23 @@ cv::Mat hue_mask(const cv::Mat& hsv, double hue_deg, double reach_deg) {
     cv::inRange(hsv, cv::Scalar(low_deg / 2, min_saturation, min_value), cv::Scalar(high_deg / 2, 255, 255), mask);
     return mask;
   };
+  constexpr double turn_deg = 360, last_deg = turn_deg - 1;
   const double low = hue_deg - reach_deg, high = hue_deg + reach_deg;
-  cv::Mat mask = in_range(std::max(0.0, low), std::min(359.0, high));
-  if (low < 0) mask |= in_range(low + 360, 359);
-  if (high > 359) mask |= in_range(0, high - 360);
+  cv::Mat mask = in_range(std::max(0.0, low), std::min(last_deg, high));
+  if (low < 0) mask |= in_range(low + turn_deg, last_deg);
+  if (high > last_deg) mask |= in_range(0, high - turn_deg);
   return mask;
+}
+
+cv::Mat ellipse(int size_px) {
+  return cv::getStructuringElement(cv::MORPH_ELLIPSE, {size_px, size_px});
 }
 
 BandMasks segment(const cv::Mat& hsv, const Marker& marker) {
   double reach_deg = widest_hue_deg;
   for (std::size_t i = 0; i < 3; ++i)
-    reach_deg =
-        std::min(reach_deg, std::abs(std::remainder(marker.hues_deg[i] - marker.hues_deg[(i + 1) % 3], 360.0)) / 2);
-  static const cv::Mat kernel = cv::getStructuringElement(cv::MORPH_ELLIPSE, {5, 5});
+    reach_deg = std::min(reach_deg, hue_gap_deg(marker.hues_deg[i], marker.hues_deg[(i + 1) % 3]) / 2);
+  static const cv::Mat kernel = ellipse(5);
   BandMasks masks;
   for (std::size_t i = 0; i < 3; ++i) {
     const cv::Mat mask = hue_mask(hsv, marker.hues_deg[i], reach_deg);
@@ -66,7 +70,7 @@ struct Region {
 // Connected regions of the three colours together, largest first.
 std::vector<Region> regions_of(const BandMasks& masks) {
   cv::Mat together = masks[0] | masks[1] | masks[2], joined, labels, stats, centroids;
-  cv::morphologyEx(together, joined, cv::MORPH_CLOSE, cv::getStructuringElement(cv::MORPH_ELLIPSE, {9, 9}));
+  cv::morphologyEx(together, joined, cv::MORPH_CLOSE, ellipse(9));
   const int count = cv::connectedComponentsWithStats(joined, labels, stats, centroids);
   std::vector<int> order;
   for (int i = 1; i < count; ++i)
@@ -82,23 +86,19 @@ std::vector<Region> regions_of(const BandMasks& masks) {
   return regions;
 }
 
-Eigen::Vector2d centroid(const cv::Mat& mask, const Region& region, double& area) {
-  const cv::Moments m = cv::moments(mask(region.box) & region.pixels(region.box), true);
-  area = m.m00;
-  return m.m00 > 0 ? Eigen::Vector2d(region.box.x + m.m10 / m.m00, region.box.y + m.m01 / m.m00)
-                   : Eigen::Vector2d::Zero();
-}
-
 // The axis' image: the middle between lines fitted to the region's two sides, directed by the order of the colours.
 struct MiddleLine {
   Eigen::Vector2d origin_px, along;  // ideal pixels
 };
 std::optional<MiddleLine> middle_line(const Camera& camera, const BandMasks& masks, const Region& region) {
+  const auto centroid = [&](const cv::Moments& m) {
+    return Eigen::Vector2d(region.box.x + m.m10 / m.m00, region.box.y + m.m01 / m.m00);
+  };
   std::array<Eigen::Vector2d, 3> centres;
   for (std::size_t band = 0; band < 3; ++band) {
-    double area = 0;
-    centres[band] = centroid(masks[band], region, area);
-    if (area < 20) return std::nullopt;
+    const cv::Moments of_band = cv::moments(masks[band](region.box) & region.pixels(region.box), true);
+    if (of_band.m00 < 20) return std::nullopt;
+    centres[band] = centroid(of_band);
   }
   const cv::Moments m = cv::moments(region.pixels(region.box), true);
   const double turn = 0.5 * std::atan2(2 * m.mu11, m.mu20 - m.mu02);
@@ -109,8 +109,7 @@ std::optional<MiddleLine> middle_line(const Camera& camera, const BandMasks& mas
 
   std::vector<cv::Point> pixels;
   cv::findNonZero(region.pixels(region.box), pixels);
-  const Eigen::Vector2d origin(region.box.x + m.m10 / m.m00, region.box.y + m.m01 / m.m00),
-      across(-along.y(), along.x());
+  const Eigen::Vector2d origin = centroid(m), across(-along.y(), along.x());
   struct Extent {
     double low = HUGE_VAL, high = -HUGE_VAL;
   };
@@ -150,7 +149,6 @@ std::optional<MiddleLine> middle_line(const Camera& camera, const BandMasks& mas
   return MiddleLine{middle_origin, middle_direction};
 }
 
-// Where the line enters and leaves each colour.
 std::optional<Edges> boundaries_on(const MiddleLine& line, const Camera& camera, const BandMasks& masks) {
   constexpr double step_px = 0.5;
   const int reach = 4 * std::max(camera.width_px, camera.height_px);
@@ -204,7 +202,8 @@ std::optional<JointVector> configuration_from(const Camera& camera, const Marker
     normal.diagonal() *= 1 + 1e-6;
     const Eigen::Vector3d step = normal.ldlt().solve(jacobian.transpose() * (measured - *at));
     if (!step.allFinite()) return std::nullopt;
-    const Eigen::Vector3d longest(0.2, 0.2, 0.02);
+    constexpr double longest_rad = 0.2;
+    const Eigen::Vector3d longest(longest_rad, longest_rad, 0.02);
     x += step.cwiseMax(-longest).cwiseMin(longest);
   }
   if (miss_px > 10) return std::nullopt;  // no shaft through the RCM looks like this
@@ -242,18 +241,13 @@ Edges moved(Edges edges, const EdgesVector& error) {
   return edges;
 }
 
-EdgesCovariance covariance_of(const Edges& edges) {
-  EdgesCovariance covariance = EdgesCovariance::Zero();
-  for (const EdgesVector& error : errors_of(edges, boundary_sigma_px)) covariance += error * error.transpose();
-  return covariance;
-}
-
 std::optional<Observation> observe_edges(const Camera& camera, const Instrument& instrument,
                                          const CrossRatioDecoder& decoder, const Edges& edges) {
   Observation o;
   o.status = Status::ok;
   o.edges_ideal_px = edges;
-  o.edges_covariance_px2 = covariance_of(edges);
+  for (const EdgesVector& error : errors_of(edges, boundary_sigma_px))
+    o.edges_covariance_px2 += error * error.transpose();
   for (std::size_t k = 0; k < 4; ++k) o.edges_raw_px[k] = camera.raw_from_ideal(edges[k]);
   const auto& camera_from_rcm = instrument.camera_from_rcm;
   o.features = features_of(edges, camera_from_rcm ? projected_rcm_px(camera, *camera_from_rcm) : std::nullopt);
@@ -305,13 +299,6 @@ std::optional<Observation> observe_edges(const Camera& camera, const Instrument&
   return o;
 }
 
-Observation::Refused refusal(const Camera& camera, const Edges& edges) {
-  Observation::Refused refused;
-  refused.what = Observation::Refused::What::edges;
-  for (std::size_t k = 0; k < 4; ++k) refused.edges_raw_px[k] = camera.raw_from_ideal(edges[k]);
-  return refused;
-}
-
 }  // namespace
 
 CenterlineMethod::CenterlineMethod(const Rig& rig) : rig_(rig) {
@@ -334,7 +321,9 @@ std::vector<Observation> CenterlineMethod::observe(const cv::Mat& image_bgr) con
           edges ? observe_edges(rig_.camera, rig_.instruments[i], decoders_[i], *edges) : std::nullopt;
       if (!observation) {
         observations[i].status = Status::poor_fit;
-        if (edges) observations[i].refused = refusal(rig_.camera, *edges);
+        Observation::Refused& refused = observations[i].refused;
+        if (edges) refused.what = Observation::Refused::What::edges;
+        for (std::size_t k = 0; edges && k < 4; ++k) refused.edges_raw_px[k] = rig_.camera.raw_from_ideal((*edges)[k]);
         continue;
       }
       observations[i] = *observation;

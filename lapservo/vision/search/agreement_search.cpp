@@ -6,24 +6,23 @@
 #include <cstddef>
 
 #include "lapservo/core/angles.h"
-#include "lapservo/vision/search/explained_colours.h"
+#include "lapservo/vision/search/starts.h"
 
 namespace lapservo::internal {
 namespace {
 
 constexpr int halvings = 5, halvings_of_place = 2, tried_directions = 14, max_moves = 8;
 const Eigen::Vector4d first_steps(0.03, 0.12, 0.006, 0.5);
-const Eigen::Vector4d steps_of_place(0.03, 0.12, 0.006, 0), steps_of_rotation = first_steps / (1 << halvings_of_place);
+const Eigen::Vector4d steps_of_place = first_steps.cwiseProduct(Eigen::Vector4d(1, 1, 1, 0)),
+                      steps_of_rotation = first_steps / (1 << halvings_of_place);
 constexpr int rotations = 48;  // of a turn
 constexpr std::size_t most_peaks = 4, most_results = 3;
-// Blood along a side makes a shaft look thin, so far away.
-constexpr std::array depth_scales{0.64, 0.8, 1.0};
+constexpr std::array depth_scales{0.64, nearer_scale, 1.0};
 
 // The pose that shows the same in the middle of the marker, at another depth.
 std::optional<PoseUnknowns> seen_at_depth(const PoseUnknowns& start, double scale, const Rigid3& camera_from_rcm,
                                           double length_m) {
-  const Rigid3& pose = start.pose().camera_from_unrolled;
-  const Eigen::Vector3d half = Eigen::Vector3d(0, 0, length_m / 2), middle = scale * (pose * half);
+  const Eigen::Vector3d middle = scale * point_on_axis(start.pose(), length_m / 2);
   const Eigen::Vector3d axis = (middle - camera_from_rcm.translation).normalized();
   const auto q = configuration_through(camera_from_rcm, middle - length_m / 2 * axis);
   return q ? std::optional(PoseUnknowns(pose_through_rcm(camera_from_rcm, *q), true)) : std::nullopt;
@@ -158,7 +157,6 @@ PoseUnknowns AgreementSearch::in_this_frame(const Scene& scene, const PoseUnknow
   Climb climb{ImageTerms::of(camera_from_rcm_, result), first_steps / (1 << halved)};
   climb.halvings = halved;
   climb.score = score_at(scene, climb, climb.terms.values, budget);
-  // To its end.
   budget.allow(WorkBudget::Beyond::all);
   finish(scene, climb, budget);
   budget.allow(WorkBudget::Beyond::none);

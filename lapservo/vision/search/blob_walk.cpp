@@ -27,8 +27,8 @@ std::vector<Pair> pair_up(const std::vector<Eigen::Vector2d>& places_px, const s
     }
   std::sort(all.begin(), all.end(), [](const Pair& a, const Pair& b) { return a.distance_px < b.distance_px; });
   for (const Pair& pair : all)
-    if (std::none_of(pairs.begin(), pairs.end(),
-                     [&](const Pair& other) { return other.place == pair.place || other.blob == pair.blob; }))
+    if (std::ranges::none_of(pairs,
+                             [&](const Pair& other) { return other.place == pair.place || other.blob == pair.blob; }))
       pairs.push_back(pair);
   return pairs;
 }

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstddef>
 #include <optional>
 #include <span>
 #include <utility>
@@ -41,10 +40,6 @@ struct BoundaryPoint {
 using SidePoints = InplaceVector<SidePoint, 2 * station_count>;
 using BoundaryPoints = InplaceVector<BoundaryPoint, 4 * line_count>;
 
-Eigen::Vector3d point_on(const ShaftPose& pose, const Marker& marker, double azimuth_rad, double along_m) {
-  return pose.camera_from_unrolled * surface_point(marker.radius_m(), azimuth_rad, along_m);
-}
-
 // Neighbouring samples of a section, first to last; none when last < first.
 struct Stretch {
   int first = 0, last = -1;
@@ -69,10 +64,11 @@ Stretch most_colourful_stretch(std::span<const std::uint8_t> classes, const Scen
 
 // Sections across the shaft: where its colours begin and end.
 SidePoints measure_sides(const Scene& scene, const ShaftPose& pose, const CylinderView& view, double reach_px) {
+  constexpr double margin = 0.04;  // of the length, at either end
   SidePoints points;
   InplaceVector<std::uint8_t, 2 * max_reach + 1> classes;
   for (int station = 0; station < station_count; ++station) {
-    const double along_m = scene.marker.length_m() * (0.04 + 0.92 * station / (station_count - 1));
+    const double along_m = scene.marker.length_m() * (margin + (1 - 2 * margin) * station / (station_count - 1));
     const auto silhouette = [&](double side) {
       return scene.camera.raw_from_point(
           point_on(pose, scene.marker, view.facing_azimuth_rad + side * view.half_visible_rad, along_m));
@@ -136,19 +132,7 @@ void add_curve_distance(const Scene& scene, const PoseUnknowns& unknowns, const 
   UnknownVector row = unknowns.row(point, pull);
   const Eigen::Vector3d axis = unknowns.pose().camera_from_unrolled.rotation * Eigen::Vector3d::UnitZ();
   row[psi_unknown] = psi_speed_m * pull.dot(axis);
-  equations.add(row, residual_px, cauchy_weight(residual_px / sigma_px, cauchy_scale_sigmas) / (sigma_px * sigma_px));
-}
-
-// Where a boundary lies on a generatrix, and how that changes with tau. For a rotation that is not known yet, ends in
-// the middle of where they lie over the turn.
-struct Place {
-  double along_m, slope_m;
-};
-Place place_of(const Marker& marker, std::size_t boundary, double azimuth_rad, double psi_rad, bool with_rotation) {
-  if (with_rotation)
-    return {boundaries_m(marker, marker_azimuth_rad(marker, azimuth_rad, psi_rad))[boundary],
-            boundary_slopes_m(marker)[boundary]};
-  return {boundaries_m(marker, marker.covered_rad() / 2)[boundary], 0};
+  equations.add(row, residual_px, robust_certainty(residual_px, sigma_px));
 }
 
 // One Gauss-Newton step on measured points. Inner boundaries count only once the rotation is known.
@@ -158,9 +142,6 @@ std::optional<PoseUnknowns> stepped(const Scene& scene, const PoseUnknowns& unkn
   const auto view = view_cylinder(pose.camera_from_unrolled, scene.marker.radius_m());
   if (!view) return std::nullopt;
   const Eigen::Matrix3d axes = pose.camera_from_unrolled.rotation.toRotationMatrix();
-  const auto azimuth_direction = [&](double azimuth_rad) -> Eigen::Vector3d {
-    return axes * Eigen::Vector3d(-std::sin(azimuth_rad), std::cos(azimuth_rad), 0);
-  };
   NormalEquations equations;
   for (const SidePoint& side : sides) {
     const double azimuth_rad = view->facing_azimuth_rad + side.side * view->half_visible_rad;
@@ -170,8 +151,13 @@ std::optional<PoseUnknowns> stepped(const Scene& scene, const PoseUnknowns& unkn
   for (const BoundaryPoint& b : boundaries) {
     const bool inner = b.boundary == 1 || b.boundary == 2;
     if (inner && !with_rotation) continue;
-    const auto [along_m, slope_m] = place_of(scene.marker, b.boundary, b.azimuth_rad, pose.psi_rad, with_rotation);
-    const Eigen::Vector3d tangent = scene.marker.radius_m() * azimuth_direction(b.azimuth_rad) + slope_m * axes.col(2);
+    // For a rotation that is not known yet, ends lie in the middle of where they lie over the turn.
+    const double tau_rad =
+        with_rotation ? marker_azimuth_rad(scene.marker, b.azimuth_rad, pose.psi_rad) : scene.marker.covered_rad() / 2;
+    const double along_m = boundaries_m(scene.marker, tau_rad)[b.boundary];
+    const double slope_m = with_rotation ? boundary_slopes_m(scene.marker)[b.boundary] : 0;
+    const Eigen::Vector3d around = axes * Eigen::Vector3d(-std::sin(b.azimuth_rad), std::cos(b.azimuth_rad), 0);
+    const Eigen::Vector3d tangent = scene.marker.radius_m() * around + slope_m * axes.col(2);
     add_curve_distance(scene, unknowns, point_on(pose, scene.marker, b.azimuth_rad, along_m), tangent, -slope_m,
                        b.raw_px, coarse_fit_limits.boundary_sigma_px, equations);
   }
@@ -229,21 +215,21 @@ class RotationScore {
   int seen_ = 0;
 };
 
-struct RotationSearch {
-  double psi_rad, score, rival_score;
-};
-RotationSearch search_rotation(const Scene& scene, const Surface& surface) {
+CoarseFit with_best_rotation(CoarseFit fit, const Scene& scene, const Surface& surface) {
   constexpr int steps = 90, rival_gap = 10;  // 0.7 rad
   const RotationScore score(scene, surface);
   std::array<double, steps> scores{};
   for (int i = 0; i < steps; ++i) scores[static_cast<std::size_t>(i)] = score.at(two_pi * i / steps);
   const int best = static_cast<int>(std::max_element(scores.begin(), scores.end()) - scores.begin());
-  double rival = -1;
+  fit.unknowns = fit.unknowns.with_psi(two_pi * best / steps);
+  fit.rotation_score = scores[static_cast<std::size_t>(best)];
+  fit.rival_score = -1;
   for (int i = 0; i < steps; ++i) {
     const int gap = std::abs(i - best);
-    if (std::min(gap, steps - gap) > rival_gap) rival = std::max(rival, scores[static_cast<std::size_t>(i)]);
+    if (std::min(gap, steps - gap) > rival_gap)
+      fit.rival_score = std::max(fit.rival_score, scores[static_cast<std::size_t>(i)]);
   }
-  return {two_pi * best / steps, scores[static_cast<std::size_t>(best)], rival};
+  return fit;
 }
 
 }  // namespace
@@ -262,12 +248,7 @@ CoarseFit fit_coarsely(const Scene& scene, PoseUnknowns start, Rotation rotation
                           narrowing * coarse_fit_limits.along_reach * scene.marker.length_m());
     const auto boundaries = measure_boundaries(scene, fit.unknowns.pose(), surface);
     if (boundaries.size() < coarse_fit_limits.min_boundaries || sides.size() < coarse_fit_limits.min_sides) return fit;
-    if (round == 1) {
-      const RotationSearch search = search_rotation(scene, surface);
-      fit.unknowns = fit.unknowns.with_psi(search.psi_rad);
-      fit.rotation_score = search.score;
-      fit.rival_score = search.rival_score;
-    }
+    if (round == 1) fit = with_best_rotation(fit, scene, surface);
     for (int step = 0; step < steps_per_round; ++step) {
       const auto next = stepped(scene, fit.unknowns, sides, boundaries, round == last);
       if (!next) return fit;

@@ -18,10 +18,6 @@ namespace {
 constexpr int places_along = 36;
 using BandsAlong = std::array<std::uint8_t, places_along>;
 
-std::uint8_t bit_of(std::size_t band) {
-  return static_cast<std::uint8_t>(1U << band);
-}
-
 BandsAlong bands_at(const Marker& marker, double tau_rad) {
   BandsAlong bands{};
   if (!is_printed(marker, tau_rad)) return bands;
@@ -29,7 +25,7 @@ BandsAlong bands_at(const Marker& marker, double tau_rad) {
   for (int k = 0; k < places_along; ++k) {
     const auto band = std::upper_bound(ends_m.begin(), ends_m.end(), marker.length_m() * (k + 0.5) / places_along) -
                       ends_m.begin() - 1;
-    if (band >= 0 && band < 3) bands[static_cast<std::size_t>(k)] = bit_of(static_cast<std::size_t>(band));
+    if (band >= 0 && band < 3) bands[static_cast<std::size_t>(k)] = static_cast<std::uint8_t>(1 << band);
   }
   return bands;
 }
@@ -46,9 +42,9 @@ BandsAlong bands_of_whole_turn(const Marker& marker) {
 }
 
 // By colour class, what bands it may be; 0 for what is none of them.
-std::array<std::uint8_t, 256> bands_of_class(const Scene& scene) {
-  std::array<std::uint8_t, 256> bands{};
-  for (std::size_t band = 3; band-- > 0;) bands[scene.bands[band]] = bit_of(band);
+auto bands_of_class(const Scene& scene) {
+  std::array<std::uint8_t, Scene::outside + 1> bands{};
+  for (std::size_t band = 3; band-- > 0;) bands[scene.bands[band]] = static_cast<std::uint8_t>(1 << band);
   return bands;
 }
 
@@ -59,13 +55,10 @@ double gain(const std::uint8_t* bgr, std::uint8_t seen, std::uint8_t here) {
 }
 
 double area_px2(const Scene& scene, const ShaftPose& pose) {
-  const auto on_axis = [&](double along_m) -> Eigen::Vector3d {
-    return pose.camera_from_unrolled * Eigen::Vector3d(0, 0, along_m);
-  };
   const double length_m = scene.marker.length_m();
-  const Eigen::Vector3d first = on_axis(0), last = on_axis(length_m);
+  const Eigen::Vector3d first = point_on_axis(pose, 0), last = point_on_axis(pose, length_m);
   if (!(first.z() > LensField::nearest_m) || !(last.z() > LensField::nearest_m)) return 0;
-  const double width_px = scene.marker.diameter_m * scene.camera.fx_px / on_axis(length_m / 2).norm();
+  const double width_px = scene.marker.diameter_m * scene.camera.fx_px / point_on_axis(pose, length_m / 2).norm();
   return width_px * (scene.camera.ideal_from_point(last) - scene.camera.ideal_from_point(first)).norm();
 }
 
@@ -80,7 +73,7 @@ double explained_area_px2(const Scene& scene, const ShaftPose& pose, bool turned
   const double most_beside = 2 * beside_radii.size() * places_along * colour_evidence.of(Place::beside, Shows::other);
   const auto view = view_cylinder(pose.camera_from_unrolled, scene.marker.radius_m());
   if (!view) return no_area_px2;
-  const double radius_m = scene.marker.radius_m(), whole_px2 = area_px2(scene, pose);
+  const double whole_px2 = area_px2(scene, pose);
   const double least_gain = above_px2 * (lines * places_along) / whole_px2 - rounding;
   const Eigen::Vector3d step =
       pose.camera_from_unrolled.rotation * Eigen::Vector3d(0, 0, scene.marker.length_m() / places_along);
@@ -92,7 +85,7 @@ double explained_area_px2(const Scene& scene, const ShaftPose& pose, bool turned
     if (gained + (lines - i) * most_of_line + most_beside < least_gain) return no_area_px2;
     const double azimuth_rad = visible_azimuth_rad(*view, line_reach, i, lines);
     if (turned) bands = bands_at(scene.marker, marker_azimuth_rad(scene.marker, azimuth_rad, pose.psi_rad));
-    const Eigen::Vector3d base = pose.camera_from_unrolled * surface_point(radius_m, azimuth_rad, 0);
+    const Eigen::Vector3d base = point_on(pose, scene.marker, azimuth_rad, 0);
     const LineInImage<places_along + 2 * beyond> line(scene, base - beyond * step, step);
     for (std::size_t k = 0; k < places_along + 2 * beyond; ++k) {
       const std::uint8_t here = k >= beyond && k < beyond + places_along ? bands[k - beyond] : 0;
@@ -103,7 +96,8 @@ double explained_area_px2(const Scene& scene, const ShaftPose& pose, bool turned
   for (const double side : {-1.0, 1.0})
     for (const double radii : beside_radii) {
       const Eigen::Vector3d base =
-          pose.camera_from_unrolled * surface_point(radii * radius_m, view->facing_azimuth_rad + side * pi / 2, 0);
+          pose.camera_from_unrolled *
+          surface_point(radii * scene.marker.radius_m(), view->facing_azimuth_rad + side * pi / 2, 0);
       const LineInImage<places_along> line(scene, base, step);
       for (std::size_t k = 0; k < places_along; ++k)
         if (const std::uint8_t* bgr = line.pixel(k, false))

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cmath>
+
 #include "lapservo/vision/shaft/scene.h"
 #include "lapservo/vision/shaft/shaft_pose.h"
 
@@ -10,7 +12,7 @@ namespace lapservo::internal {
 /// and bare shaft, which has none at all, on the marker; the marker's colours beside it, and blood where bare shaft
 /// should be. By area, since of shafts that lie within the colours the largest explains most. `turned`: at the pose's
 /// rotation; else as at any. Only areas above `above_px2` are wanted: no_area_px2 as soon as it can't be one.
-inline constexpr double no_area_px2 = -1e9;
+inline constexpr double no_area_px2 = -HUGE_VAL;
 double explained_area_px2(const Scene& scene, const ShaftPose& pose, bool turned, double above_px2 = no_area_px2);
 
 }  // namespace lapservo::internal

@@ -1,7 +1,6 @@
 #include "lapservo/vision/search/line_segmentation.h"
 
 #include <algorithm>
-#include <cstddef>
 
 namespace lapservo::internal {
 namespace {
@@ -37,7 +36,7 @@ class Rewards {
   const std::array<float, states>& of(std::uint8_t colour) const { return of_kind_[kind_[colour]]; }
 
  private:
-  std::array<std::uint8_t, 256> kind_;
+  std::array<std::uint8_t, Scene::outside + 1> kind_;
   std::array<std::array<float, states>, 6> of_kind_;
 };
 

@@ -3,11 +3,8 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <span>
-#include <vector>
 
-#include "lapservo/core/statistics.h"
 #include "lapservo/vision/colour/colour_evidence.h"
 #include "lapservo/vision/shaft/scene.h"
 
@@ -24,11 +21,6 @@ struct LineSegmentation {
 /// blood, highlights and noise inside a band cost a little but do not break it. `classes` run from proximal to distal;
 /// Scene::outside counts for nothing. At most 512 samples.
 LineSegmentation segment_line(std::span<const std::uint8_t> classes, const std::array<std::uint8_t, 3>& bands);
-
-/// Where an end of the marker is by the lines that show it: the median of two or more, which is reordered.
-inline std::optional<double> agreed_end(std::vector<double>& places) {
-  return places.size() < 2 ? std::nullopt : std::optional(median(places));
-}
 
 /// The gain of segment_line from a sample of a colour in a state: 0 shaft, 1..3 the bands, 4 shaft. Internal.
 inline float line_reward(std::size_t state, std::uint8_t colour, const std::array<std::uint8_t, 3>& bands) {

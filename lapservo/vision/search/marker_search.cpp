@@ -85,21 +85,9 @@ Starts starts_in(const SearchFrame& frame, bool through_rcm, const Blob& blob, W
   return starts;
 }
 
-}  // namespace
-
-Found follow(const Scene& scene, const LightImage& light, const PoseUnknowns& expected, const EdgeBlur& blur,
-             const Expected& processing, WorkBudget& budget) {
-  Found near = fitted_from(scene, light, expected, blur, processing, budget);
-  if (near.fit || near.status == Status::marker_mismatch) return near;
-  if (const CoarseFit coarse = fitted_coarsely(scene, expected, Rotation::known, budget); coarse.found)
-    if (Found found = fitted_from(scene, light, coarse.unknowns, blur, processing, budget); found.fit) return found;
-  if (!scene.registration || !expected.through_rcm()) return near;
-  return fitted_from(scene, light, expected.with_rcm(false), blur, processing, budget);
-}
-
 // The starts of one blob, until one fits. Rivals are all tried, in one frame.
-Found MarkerSearch::detect_in_blob(const SearchFrame& frame, bool through_rcm, const Blob& blob, Walk& walk,
-                                   WorkBudget& budget) {
+Found detect_in_blob(const SearchFrame& frame, bool through_rcm, const Blob& blob, SearchWalk& walk,
+                     WorkBudget& budget) {
   Found best;
   bool has_rivals = false;
   const std::size_t first = walk.blobs.start();
@@ -128,7 +116,7 @@ Found MarkerSearch::detect_in_blob(const SearchFrame& frame, bool through_rcm, c
   return has_rivals ? refusal(Status::ambiguous, best.fit->unknowns) : best;
 }
 
-Found MarkerSearch::detect(const SearchFrame& frame, bool through_rcm, Walk& walk, WorkBudget& budget) {
+Found detect(const SearchFrame& frame, bool through_rcm, SearchWalk& walk, WorkBudget& budget) {
   Found best;
   for (const Blob* blob : walk.blobs.rest(frame.blobs, reach_px(frame))) {
     Found found = detect_in_blob(frame, through_rcm, *blob, walk, budget);
@@ -143,13 +131,14 @@ Found MarkerSearch::detect(const SearchFrame& frame, bool through_rcm, Walk& wal
   return best;
 }
 
+enum class Rival { none, found, not_known_yet };
+
 // Whether the marker shows in another place as well: a second print, a reflection, an image of tiles. The RCM would
 // show which is ours. All in one frame: in another one a rival may be where none was.
-MarkerSearch::Rival MarkerSearch::look_for_rival(const SearchFrame& frame, const FineFit& fit, WorkBudget& budget) {
+Rival look_for_rival(const SearchFrame& frame, const FineFit& fit, WorkBudget& budget) {
   const Scene& scene = frame.scene;
   const auto middle = [&](const PoseUnknowns& unknowns) {
-    const Eigen::Vector3d along(0, 0, scene.marker.length_m() / 2);
-    return scene.camera.raw_from_point(unknowns.pose().camera_from_unrolled * along);
+    return scene.camera.raw_from_point(point_on_axis(unknowns.pose(), scene.marker.length_m() / 2));
   };
   const double apart_px = rival_apart_radii * scene.marker.radius_m() /
                           fit.unknowns.pose().camera_from_unrolled.translation.norm() * scene.camera.fx_px;
@@ -162,6 +151,18 @@ MarkerSearch::Rival MarkerSearch::look_for_rival(const SearchFrame& frame, const
       if (other.fit && (middle(other.fit->unknowns) - middle(fit.unknowns)).norm() > apart_px) return Rival::found;
     }
   return Rival::none;
+}
+
+}  // namespace
+
+Found follow(const Scene& scene, const LightImage& light, const PoseUnknowns& expected, const EdgeBlur& blur,
+             const Expected& processing, WorkBudget& budget) {
+  Found near = fitted_from(scene, light, expected, blur, processing, budget);
+  if (near.fit || near.status == Status::marker_mismatch) return near;
+  if (const CoarseFit coarse = fitted_coarsely(scene, expected, Rotation::known, budget); coarse.found)
+    if (Found found = fitted_from(scene, light, coarse.unknowns, blur, processing, budget); found.fit) return found;
+  if (!scene.registration || !expected.through_rcm()) return near;
+  return fitted_from(scene, light, expected.with_rcm(false), blur, processing, budget);
 }
 
 // The candidate as it shows in this frame; whether it doesn't.
@@ -212,7 +213,7 @@ Found MarkerSearch::despite_registration(const SearchFrame& frame, bool plain_is
   if (!free.fit || !free.fit->is_well_seen()) return {};
   if (plain_is_known) return free;
   // In this frame a fit through the RCM may be possible where none was before.
-  Walk again;
+  SearchWalk again;
   budget.allow(WorkBudget::Beyond::all);
   Found through_rcm = detect(frame, true, again, budget);
   return through_rcm.fit ? through_rcm : free;

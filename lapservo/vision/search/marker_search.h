@@ -36,6 +36,13 @@ struct SearchFrame {
 Found follow(const Scene& scene, const LightImage& light, const PoseUnknowns& expected, const EdgeBlur& blur,
              const Expected& processing, WorkBudget& budget);
 
+/// A search from blob to blob; done when none is left.
+struct SearchWalk {
+  BlobWalk blobs;
+  bool done = false;
+  bool other_bands = false;  ///< Starts
+};
+
 /// Looks for one marker all over a frame: first for what shows plainly, of a well known RCM on lines through it, else
 /// by the blobs' outlines; of a well known RCM then without regard to it, and at last for markers that are hidden in
 /// large parts, which takes tens of milliseconds. Work beyond the budget is done in the frames to come, from where it
@@ -46,18 +53,6 @@ class MarkerSearch {
   Found look(const SearchFrame& frame, WorkBudget& budget);
 
  private:
-  // A search from blob to blob; done when none is left.
-  struct Walk {
-    BlobWalk blobs;
-    bool done = false;
-    bool other_bands = false;  // Starts
-  };
-  enum class Rival { none, found, not_known_yet };
-
-  static Found detect_in_blob(const SearchFrame& frame, bool through_rcm, const Blob& blob, Walk& walk,
-                              WorkBudget& budget);
-  static Found detect(const SearchFrame& frame, bool through_rcm, Walk& walk, WorkBudget& budget);
-  static Rival look_for_rival(const SearchFrame& frame, const FineFit& fit, WorkBudget& budget);
   Found look_without_rcm(const SearchFrame& frame, WorkBudget& budget);
   Found look_with_rcm(const SearchFrame& frame, WorkBudget& budget);
   Found look_long(const SearchFrame& frame, bool is_mismatch, bool plain_is_known, WorkBudget& budget);
@@ -71,7 +66,7 @@ class MarkerSearch {
 
   Status status_ = Status::no_marker;  // of the last whole look at what shows plainly
   bool other_bands_ = false;           // that look saw bands which the marker has at no azimuth
-  Walk plain_, free_, hidden_;
+  SearchWalk plain_, free_, hidden_;
   bool searches_long_ = false;  // what shows plainly was not found
   bool longs_turn_ = false;
   std::optional<AgreementSearch> agreement_;

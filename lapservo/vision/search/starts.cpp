@@ -3,10 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstddef>
 #include <cstdint>
-#include <optional>
-#include <vector>
 
 #include <Eigen/Eigenvalues>
 
@@ -22,30 +19,20 @@ namespace {
 
 constexpr double least_sine = 0.05;  // of the angle from the pole: lines fan out
 constexpr std::size_t line_count = 32, few_lines = 12, line_samples = 112, most_starts = 3;
-constexpr double nearer_scale = 0.8;  // blood along a side makes a shaft look thin, so far away
 
 // Rays of the camera by their angles: alpha about a pole, beta from it. The pole is the direction to a point that the
 // shaft's axis passes through on its proximal side, so the axis lies on one alpha, with beta growing towards its tip.
-class RaysFromPole {
- public:
-  explicit RaysFromPole(const Eigen::Vector3d& pole) : pole_(pole) {
-    first_ = pole_.unitOrthogonal();
-    second_ = pole_.cross(first_);
-  }
-  double alpha_rad(const Eigen::Vector3d& ray) const { return std::atan2(ray.dot(second_), ray.dot(first_)); }
-  double beta_rad(const Eigen::Vector3d& ray) const {
-    return std::acos(std::clamp(ray.normalized().dot(pole_), -1.0, 1.0));
-  }
-  const Eigen::Vector3d& pole() const { return pole_; }
-  Eigen::Vector3d across(double alpha_rad) const {
-    return std::cos(alpha_rad) * first_ + std::sin(alpha_rad) * second_;
-  }
-  Eigen::Vector3d ray(double alpha_rad, double beta_rad) const {
-    return std::cos(beta_rad) * pole_ + std::sin(beta_rad) * across(alpha_rad);
-  }
+struct RaysFromPole {
+  Eigen::Vector3d pole, first = pole.unitOrthogonal(), second = pole.cross(first);
 
- private:
-  Eigen::Vector3d pole_, first_, second_;
+  double alpha_rad(const Eigen::Vector3d& ray) const { return std::atan2(ray.dot(second), ray.dot(first)); }
+  double beta_rad(const Eigen::Vector3d& ray) const {
+    return std::acos(std::clamp(ray.normalized().dot(pole), -1.0, 1.0));
+  }
+  Eigen::Vector3d across(double alpha_rad) const { return std::cos(alpha_rad) * first + std::sin(alpha_rad) * second; }
+  Eigen::Vector3d ray(double alpha_rad, double beta_rad) const {
+    return std::cos(beta_rad) * pole + std::sin(beta_rad) * across(alpha_rad);
+  }
 };
 
 // The part of the rays that a blob lies in.
@@ -85,10 +72,10 @@ std::optional<Fan> fan_over(const Scene& scene, const Blob& blob, const RaysFrom
     const Eigen::Vector3d ray = scene.camera.ray_from_ideal(*ideal_px).normalized();
     if (!alpha_rad) {
       alpha_rad = rays.alpha_rad(ray);
-      ahead = rays.across(*alpha_rad), aside = rays.pole().cross(ahead);
+      ahead = rays.across(*alpha_rad), aside = rays.pole.cross(ahead);
     }
     if (!(ray.dot(ahead) > 0)) return std::nullopt;
-    const double tangent = ray.dot(aside) / ray.dot(ahead), cosine = ray.dot(rays.pole());
+    const double tangent = ray.dot(aside) / ray.dot(ahead), cosine = ray.dot(rays.pole);
     least_tangent = std::min(least_tangent, tangent), most_tangent = std::max(most_tangent, tangent);
     least_cosine = std::min(least_cosine, cosine), most_cosine = std::max(most_cosine, cosine);
     bands[static_cast<std::size_t>(band - scene.bands.begin())].push_back(cosine);
@@ -118,15 +105,6 @@ using Lines = std::vector<Line>;
 // Cosine and sine of each sample's beta: all lines have the same.
 using Samples = std::array<Eigen::Vector2d, line_samples>;
 
-Samples samples_of(const Fan& fan) {
-  Samples samples;
-  for (std::size_t k = 0; k < line_samples; ++k) {
-    const double beta_rad = fan.beta_rad(static_cast<double>(k) + 0.5);
-    samples[k] = {std::cos(beta_rad), std::sin(beta_rad)};
-  }
-  return samples;
-}
-
 std::uint8_t class_on_ray(const Scene& scene, const Eigen::Vector3d& ray) {
   return scene.field.contains(ray) ? scene.class_beside(scene.camera.raw_from_point(ray)) : Scene::outside;
 }
@@ -135,7 +113,7 @@ Line line_at(const Scene& scene, const RaysFromPole& rays, double alpha_rad, con
   const Eigen::Vector3d across = rays.across(alpha_rad);
   std::array<std::uint8_t, line_samples> classes;
   for (std::size_t k = 0; k < line_samples; ++k) {
-    const Eigen::Vector3d ray = samples[k].x() * rays.pole() + samples[k].y() * across;
+    const Eigen::Vector3d ray = samples[k].x() * rays.pole + samples[k].y() * across;
     classes[k] = class_on_ray(scene, ray);
   }
   Line line{segment_line(classes, scene.bands)};
@@ -219,6 +197,11 @@ std::optional<BandShares> shares_of(const LineSegmentation& split) {
   return shares;
 }
 
+// Where an end of the marker is by the lines that show it: the median of two or more, which is reordered.
+std::optional<double> agreed_end(std::vector<double>& places) {
+  return places.size() < 2 ? std::nullopt : std::optional(median(places));
+}
+
 // Whether nothing shows beside a line of the fan, by the image's border or another instrument, on most places from
 // first to last.
 bool is_hidden(const Scene& scene, const RaysFromPole& rays, double alpha_rad, double first_beta_rad,
@@ -233,8 +216,15 @@ bool is_hidden(const Scene& scene, const RaysFromPole& rays, double alpha_rad, d
   return 2 * hidden > places;
 }
 
-Extent extent_of(const Scene& scene, const RaysFromPole& rays, const Fan& fan, const Lines& lines,
-                 const Window& window) {
+struct SplitFan {
+  RaysFromPole rays;
+  Fan fan;
+  Lines lines;
+  std::vector<Window> windows;  // best first
+};
+
+Extent extent_of(const Scene& scene, const SplitFan& split, const Window& window) {
+  const auto& [rays, fan, lines, windows] = split;
   const double most = most_score(lines, window);
   std::vector<double> first, last;
   double sum = 0, lowest = static_cast<double>(lines.size()), highest = 0;
@@ -282,7 +272,7 @@ double distance_of(const Scene& scene, const Extent& extent, double first_beta_r
   constexpr double nearest_m = 0.03, farthest_m = 0.4, sigma_rad = 0.005, sigma_log = 0.3;
   const double by_width_m = distance_by_width_m(scene, extent);
   if (!extent.first_beta_rad || !extent.last_beta_rad) return by_width_m;
-  const Eigen::Vector3d rcm = rcm_m * extent.rays.pole();
+  const Eigen::Vector3d rcm = rcm_m * extent.rays.pole;
   double least = HUGE_VAL, best_m = by_width_m;
   for (int i = 0; i <= steps; ++i) {
     const double distance_m = nearest_m * std::pow(farthest_m / nearest_m, 1.0 * i / steps);
@@ -319,7 +309,7 @@ void add_free_starts(const Scene& scene, const Extent& extent, double distance_m
   const double last_beta_rad = extent.last_beta_rad.value_or(first_beta_rad + shown_rad);
   const double tilt_rad = std::acos(std::clamp((last_beta_rad - first_beta_rad) / shown_rad, 0.0, 1.0));
   const Eigen::Vector3d sight = extent.rays.ray(alpha_rad, (first_beta_rad + last_beta_rad) / 2);
-  const Eigen::Vector3d across_sight = (sight * sight.dot(extent.rays.pole()) - extent.rays.pole()).normalized();
+  const Eigen::Vector3d across_sight = (sight * sight.dot(extent.rays.pole) - extent.rays.pole).normalized();
   for (const double sign : {1.0, -1.0}) {
     const Eigen::Vector3d axis = std::cos(tilt_rad) * across_sight + sign * std::sin(tilt_rad) * sight;
     const Eigen::Vector3d proximal =
@@ -329,21 +319,17 @@ void add_free_starts(const Scene& scene, const Extent& extent, double distance_m
   }
 }
 
-// A blob on the lines of a fan.
-struct SplitFan {
-  RaysFromPole rays;
-  Fan fan;
-  Lines lines;
-  std::vector<Window> windows;  // best first
-};
-
 std::optional<SplitFan> split_fan(const Scene& scene, const Blob& blob, const Eigen::Vector3d& pole,
                                   std::size_t lines = line_count) {
-  const RaysFromPole rays(pole);
+  const RaysFromPole rays{pole};
   const auto fan = fan_over(scene, blob, rays, lines);
   if (!fan) return std::nullopt;
   SplitFan split{rays, *fan, {}, {}};
-  const Samples samples = samples_of(*fan);
+  Samples samples;
+  for (std::size_t k = 0; k < line_samples; ++k) {
+    const double beta_rad = fan->beta_rad(static_cast<double>(k) + 0.5);
+    samples[k] = {std::cos(beta_rad), std::sin(beta_rad)};
+  }
   for (std::size_t i = 0; i < lines; ++i)
     split.lines.push_back(line_at(scene, rays, fan->alpha_rad(static_cast<double>(i)), samples));
   split.windows = best_windows(scene, *fan, split.lines);
@@ -362,11 +348,10 @@ Eigen::Vector3d turned_pole(const SplitFan& split) {
         if (a.seen[end] && b.seen[end])
           slopes.push_back((b.position[end] - a.position[end]) / static_cast<double>(j - i));
       }
-  const Eigen::Vector3d& pole = split.rays.pole();
-  if (slopes.empty()) return pole;
+  if (slopes.empty()) return split.rays.pole;
   const double turn_rad = std::atan(median(slopes) * split.fan.step_beta_rad / split.fan.step_alpha_rad);
   const Eigen::Vector3d aside = split.rays.across(split.fan.alpha_rad(static_cast<double>(window.middle)) + pi / 2);
-  return std::cos(turn_rad) * pole + std::sin(turn_rad) * aside;
+  return std::cos(turn_rad) * split.rays.pole + std::sin(turn_rad) * aside;
 }
 
 // Where a blob spreads most, across the line of sight; nullopt where it shows nothing of the marker's colours.
@@ -390,7 +375,7 @@ std::optional<Eigen::Vector3d> long_direction(const Scene& scene, const Blob& bl
 
 void add_extents(const Scene& scene, const SplitFan& split, std::vector<Extent>& extents) {
   for (const Window& window : split.windows) {
-    const Extent extent = extent_of(scene, split.rays, split.fan, split.lines, window);
+    const Extent extent = extent_of(scene, split, window);
     if (extent.first_beta_rad || extent.last_beta_rad) extents.push_back(extent);
   }
 }
@@ -398,7 +383,7 @@ void add_extents(const Scene& scene, const SplitFan& split, std::vector<Extent>&
 void add_extents(const Scene& scene, const Blob& blob, const std::optional<Rigid3>& camera_from_rcm,
                  std::vector<Extent>& extents) {
   if (camera_from_rcm) {
-    if (!(camera_from_rcm->translation.norm() > 1e-3)) return;
+    if (!(camera_from_rcm->translation.norm() > LensField::nearest_m)) return;
     if (const auto split = split_fan(scene, blob, camera_from_rcm->translation.normalized()))
       add_extents(scene, *split, extents);
     return;

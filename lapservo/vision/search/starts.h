@@ -11,6 +11,9 @@
 
 namespace lapservo::internal {
 
+/// Blood along a side makes a shaft look thin, so far away: it may be nearer by this factor.
+inline constexpr double nearer_scale = 0.8;
+
 struct Starts {
   std::vector<PoseUnknowns> poses;  ///< the likeliest first
   std::size_t rivals = 0;           ///< of the first so many, each may fit

@@ -22,16 +22,12 @@ RcmMeasurement RcmPrior::of(const ShaftPose& pose, double least_sigma_m) const {
   const Eigen::Matrix2d variances = across * covariance.topLeftCorner<3, 3>() * across.transpose() +
                                     least_sigma_m * least_sigma_m * Eigen::Matrix2d::Identity();
   const Eigen::LLT<Eigen::Matrix2d> root(variances);
-  RcmMeasurement measurement;
   // Where the RCM lies in the unrolled frame, as that turns about its x and y and moves along them.
   Eigen::Matrix<double, 2, fit_unknowns> rows = Eigen::Matrix<double, 2, fit_unknowns>::Zero();
   rows(0, 1) = -rcm.z(), rows(0, 2) = -1;
   rows(1, 0) = rcm.z(), rows(1, 3) = -1;
-  measurement.rows = root.matrixL().solve(rows);
-  measurement.residual = root.matrixL().solve(Eigen::Vector2d(-rcm.head<2>()));
-  measurement.by_rcm_m = root.matrixL().solve(Eigen::Matrix<double, 2, 3>(-across));
-  measurement.is_proximal = rcm.z() < 0;
-  return measurement;
+  return {root.matrixL().solve(rows), root.matrixL().solve(Eigen::Vector2d(-rcm.head<2>())),
+          root.matrixL().solve(Eigen::Matrix<double, 2, 3>(-across)), rcm.z() < 0};
 }
 
 std::optional<RcmPrior> registration_of(const Instrument& instrument) {

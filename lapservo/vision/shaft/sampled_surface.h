@@ -76,8 +76,7 @@ struct SampledSurface {
     for (int i = 0; i < line_count; ++i) {
       Line& line = lines[static_cast<std::size_t>(i)];
       line.azimuth_rad = visible_azimuth_rad(view, reach, i, line_count);
-      const LineInImage<Samples> places(
-          scene, pose.camera_from_unrolled * surface_point(scene.marker.radius_m(), line.azimuth_rad, first_m), step);
+      const LineInImage<Samples> places(scene, point_on(pose, scene.marker, line.azimuth_rad, first_m), step);
       for (std::size_t k = 0; k < Samples; ++k) line.classes[k] = places.class_on_shaft(k);
     }
   }

@@ -40,21 +40,16 @@ struct Scene {
   /// The same, and `outside` where another instrument's marker shows.
   std::uint8_t class_beside(const Eigen::Vector2d& raw_px) const {
     const std::uint8_t colour = class_at(raw_px);
-    return others.empty() ? colour : unless_explained(raw_px, colour);
+    return !others.empty() && explained_by(others, raw_px, colour) ? outside : colour;
   }
   /// Whether another instrument lies before what would be seen there at this depth (z in the camera's frame).
   bool hidden(const Eigen::Vector2d& raw_px, double depth_m) const {
-    return !others.empty() && hidden_by_others(raw_px, depth_m);
+    return !others.empty() && hidden_by(others, raw_px, depth_m);
   }
   /// Whether the registration shows on which lines of the image the shaft may lie.
   bool knows_rcm() const { return registration && registration->is_within(marker.radius_m()); }
   /// Whether it is the class of one of the marker's bands.
   bool is_ours(std::uint8_t colour) const { return colour == bands[0] || colour == bands[1] || colour == bands[2]; }
-
- private:
-  // Not inline: they are needed seldom, and what looks at every pixel of a line is short without them.
-  std::uint8_t unless_explained(const Eigen::Vector2d& raw_px, std::uint8_t colour) const;
-  bool hidden_by_others(const Eigen::Vector2d& raw_px, double depth_m) const;
 };
 
 }  // namespace lapservo::internal

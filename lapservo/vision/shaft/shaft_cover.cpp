@@ -16,10 +16,6 @@ constexpr double before_m = 0.3;       // of the marker, at most so much of the 
 constexpr double reach_lengths = 0.5;  // of the marker's length: nobody knows where the shaft ends
 constexpr double nearest_m = 0.01;     // to the camera
 
-Eigen::Vector3d on_axis(const ShaftPose& pose, double along_m) {
-  return pose.camera_from_unrolled * Eigen::Vector3d(0, 0, along_m);
-}
-
 // A part of a shaft's axis as the image shows it, without the lens's distortion.
 struct Segment {
   Eigen::Vector2d from_px, to_px;
@@ -28,7 +24,7 @@ struct Segment {
 
 // As far as it lies before the camera.
 std::optional<Segment> axis_in_image(const Camera& camera, const ShaftPose& pose, double from_m, double to_m) {
-  Eigen::Vector3d from = on_axis(pose, from_m), to = on_axis(pose, to_m);
+  Eigen::Vector3d from = point_on_axis(pose, from_m), to = point_on_axis(pose, to_m);
   if (std::max(from.z(), to.z()) < nearest_m) return std::nullopt;
   const Eigen::Vector3d way = to - from;
   if (from.z() < nearest_m) from += (nearest_m - from.z()) / way.z() * way;
@@ -82,20 +78,20 @@ void ShaftCover::draw(const Camera& camera, const Marker& marker, const std::arr
     ends_m[i] =
         boundaries_m(marker, marker_azimuth_rad(marker, view->facing_azimuth_rad + std::asin(sine), pose.psi_rad));
   }
-  const auto generatrix_at = [&](double side, double along_m) -> Eigen::Vector3d {
-    return pose.camera_from_unrolled *
-           surface_point(marker.radius_m(), view->facing_azimuth_rad + side * view->half_visible_rad, along_m);
+  const auto generatrix_at = [&](double side, double along_m) {
+    return point_on(pose, marker, view->facing_azimuth_rad + side * view->half_visible_rad, along_m);
   };
   const LensField field(camera);
   const auto in_field = [&](const Eigen::Vector3d& point) { return point.z() > nearest_m && field.contains(point); };
+  constexpr double aside_m = 1e-4;
   const auto section_at = [&](double along_m) -> std::optional<Section> {
     const Eigen::Vector3d left = generatrix_at(-1, along_m), right = generatrix_at(1, along_m),
                           front = generatrix_at(0, along_m);
-    const Eigen::Vector3d axis = on_axis(pose, along_m), next = on_axis(pose, along_m + 1e-4);
+    const Eigen::Vector3d axis = point_on_axis(pose, along_m), next = point_on_axis(pose, along_m + aside_m);
     if (!in_field(left) || !in_field(right) || !in_field(front) || !in_field(next)) return std::nullopt;
     Section section{along_m, 0, axis.z(), camera.raw_from_point(left), camera.raw_from_point(right), {}};
     section.bulge_px = camera.raw_from_point(front) - (section.left_px + section.right_px) / 2;
-    section.px_per_m = (camera.ideal_from_point(next) - camera.ideal_from_point(axis)).norm() / 1e-4;
+    section.px_per_m = (camera.ideal_from_point(next) - camera.ideal_from_point(axis)).norm() / aside_m;
     const Eigen::Vector2d out_px = doubt_px * (section.right_px - section.left_px).normalized();
     section.left_px -= out_px, section.right_px += out_px;
     return section;
@@ -161,7 +157,7 @@ bool may_meet(const Camera& camera, const Marker& marker, const ShaftPose& pose,
   const auto shaft = shaft_in_image(camera, others_marker, other);
   if (!marked || !shaft) return false;
   // The part of the other's shaft that is nearest to the camera may be far from here.
-  const double others_nearest_m = std::max({nearest_m, shaft->nearest_m, on_axis(other, 0).z() / 2});
+  const double others_nearest_m = std::max({nearest_m, shaft->nearest_m, point_on_axis(other, 0).z() / 2});
   const double radii_px =
       camera.fx_px * (marker.radius_m() / marked->nearest_m + others_marker.radius_m() / others_nearest_m);
   return distance_px(*marked, *shaft) < radii_px + apart_px;
@@ -192,9 +188,13 @@ bool lies_beside(const Camera& camera, const Marker& others_marker, const ShaftP
 }
 
 bool explained_by(std::span<const ShaftCover* const> others, const Eigen::Vector2d& raw_px, std::uint8_t colour) {
-  return std::any_of(others.begin(), others.end(), [&](const ShaftCover* other) {
-    return other->explains(raw_px.x() + 0.5, raw_px.y() + 0.5, colour);
-  });
+  return std::ranges::any_of(
+      others, [&](const ShaftCover* other) { return other->explains(raw_px.x() + 0.5, raw_px.y() + 0.5, colour); });
+}
+
+bool hidden_by(std::span<const ShaftCover* const> others, const Eigen::Vector2d& raw_px, double depth_m) {
+  return std::ranges::any_of(
+      others, [&](const ShaftCover* other) { return other->hides(raw_px.x() + 0.5, raw_px.y() + 0.5, depth_m); });
 }
 
 std::vector<Blob> without(const std::vector<Blob>& blobs, std::span<const ShaftCover* const> others) {

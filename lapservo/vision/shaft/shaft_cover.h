@@ -82,8 +82,11 @@ bool may_meet(const Camera& camera, const Marker& marker, const ShaftPose& pose,
 bool lies_beside(const Camera& camera, const Marker& others_marker, const ShaftPose& other, const Blob& blob,
                  const std::array<std::uint8_t, 3>& bands);
 
-/// Whether the marker of one of them shows in a pixel of this colour class, as far as colours show.
+/// Whether the marker of one of them shows in a pixel of this colour class, as far as colours show; and whether one
+/// lies before what is seen there at this depth. Not inline: they are needed seldom, and what looks at every pixel of a
+/// line is short without them.
 bool explained_by(std::span<const ShaftCover* const> others, const Eigen::Vector2d& raw_px, std::uint8_t colour);
+bool hidden_by(std::span<const ShaftCover* const> others, const Eigen::Vector2d& raw_px, double depth_m);
 
 /// The parts of them that the instruments that are known to be in the image leave, largest first. The parts of one that
 /// lies behind another stay together.

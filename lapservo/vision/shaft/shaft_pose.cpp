@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "lapservo/core/angles.h"
-#include "lapservo/geometry/cylinder.h"
 #include "lapservo/geometry/rotation.h"
 #include "lapservo/marker/azimuths.h"
 

@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 
+#include "lapservo/geometry/cylinder.h"
 #include "lapservo/geometry/rigid3.h"
 #include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/marker/marker.h"
@@ -16,6 +17,14 @@ struct ShaftPose {
   Rigid3 camera_from_unrolled;
   double psi_rad = 0;
 };
+
+/// Points of the shaft in the camera's frame, `along_m` from the marker's proximal end: on its axis, on its surface.
+inline Eigen::Vector3d point_on_axis(const ShaftPose& pose, double along_m) {
+  return pose.camera_from_unrolled * Eigen::Vector3d(0, 0, along_m);
+}
+inline Eigen::Vector3d point_on(const ShaftPose& pose, const Marker& marker, double azimuth_rad, double along_m) {
+  return pose.camera_from_unrolled * surface_point(marker.radius_m(), azimuth_rad, along_m);
+}
 
 /// Azimuth on the marker of the generatrix that faces the camera, [0, 2 pi). Nullopt where the camera is inside of the
 /// shaft.
