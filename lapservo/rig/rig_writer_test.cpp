@@ -103,7 +103,7 @@ void change_marker(Random& random, Marker& marker) {
   if (some(random)) marker.gap_rad = random.uniform(0, 0.3);
   if (some(random)) marker.tolerance_m = 0, marker.sigmas.tolerance_m.reset();
   if (some(random)) marker.sigmas = {};
-  if (some(random)) marker.sigmas.bands_upper_m = random_sigmas(random);
+  if (some(random)) marker.sigmas.bands_upper_m = marker.sigmas.bands_lower_m = random_sigmas(random);
   if (some(random)) marker.sigmas.wrap_m = random.uniform(0, 1e-3);
 }
 

@@ -145,7 +145,7 @@ std::optional<BandShares> shares_in(const Observation& observation) {
 
 // "3.5 to 17.0", of the shortest and the longest.
 std::string range_mm(double a_m, double b_m) {
-  const auto [low, high] = std::minmax(1000 * a_m, 1000 * b_m);
+  const auto [low, high] = std::minmax({1000 * a_m, 1000 * b_m});
   return high - low < 0.1 ? fmt::format("{:.1f}", low) : fmt::format("{:.1f} to {:.1f}", low, high);
 }
 

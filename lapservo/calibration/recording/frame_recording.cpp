@@ -55,7 +55,8 @@ FramesRead read_frames(const FrameRecording& recording, const Rig& rig, int ever
                look(deinterlace ? field.of(frame->bgr).clone() : frame->bgr, frame->time_s));
   }
   if (source.kind() == FrameSource::Kind::live) frames.stopped = false;  // that is how a camera's recording ends
-  if (!frames.stopped && frames.all_damaged()) throw InputError(recording.name, text_of_damaged(frames.damaged, frames.damaged));
+  if (!frames.stopped && frames.all_damaged())
+    throw InputError(recording.name, text_of_damaged(frames.damaged, frames.damaged));
   frames.lossy = source.is_lossy() || frames.jpegs > 0;
   frames.complaint = source.complaint();
   return frames;

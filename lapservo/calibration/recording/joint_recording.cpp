@@ -8,7 +8,6 @@
 #include <fmt/ranges.h>
 
 #include "lapservo/core/error.h"
-#include "lapservo/core/joint_units.h"
 
 namespace lapservo::internal {
 namespace {
@@ -82,14 +81,12 @@ JointRecording joint_recording_of(const CsvTable& table, const std::string& sour
 }
 
 void check_units(const JointRecording& recording, const Joints& joints, const std::string& source, JointsOf whose) {
-  constexpr double turn_rad = 2 * std::numbers::pi;
-  std::array<double, 4> largest{2 * turn_rad, 2 * turn_rad, 16 * turn_rad, 16 * turn_rad};
-  // An offset takes a reading that is larger to no plausible configuration.
-  if (whose == JointsOf::arm) std::copy_n(joint_positions.most.begin(), 3, largest.begin());
+  constexpr double turn_rad = 2 * std::numbers::pi, largest_m = 2;
+  constexpr std::array<double, 4> largest_rad{2 * turn_rad, 2 * turn_rad, 16 * turn_rad, 16 * turn_rad};
   for (std::size_t i = 0; i < joints.names.size(); ++i) {
     const bool is_length = whose == JointsOf::arm && i == 2;
     for (const auto& at : recording.joints)
-      if (std::abs(at[i]) > largest[i])
+      if (std::abs(at[i]) > (is_length ? largest_m : largest_rad[i]))
         throw InputError(source, joints.names[i], fmt::format("{:.6g}", at[i]),
                          is_length ? "metres: it looks like millimetres" : "radians: it looks like degrees");
   }

@@ -89,6 +89,12 @@ class Explainer {
     return true;
   }
 
+  // The noise of a fit without a fault.
+  std::optional<Eigen::VectorXd> noise_without() const {
+    const auto fitted = fit_to(poses_, recording_, {});
+    return fitted ? std::optional(noise_of(fitted->fit.residuals)) : std::nullopt;
+  }
+
   const std::optional<Explanation>& best() const { return best_; }
 
  private:
@@ -174,7 +180,8 @@ std::string explaining_fault(const Instrument& instrument, const std::vector<Tim
   const auto& best = explainer.best();
   if (!best) return {};
   const double left = best->noise.maxCoeff();
-  const bool gains = !fit || fit->noise.cwiseQuotient(best->noise).maxCoeff() > least_gain;
+  const auto without = fit ? std::optional(fit->noise) : explainer.noise_without();
+  const bool gains = !without || without->cwiseQuotient(best->noise).maxCoeff() > least_gain;
   const bool is_little = left < most_left || (fit && left < most_part_left * fit->noise.maxCoeff());
   return gains && is_little ? best->text : std::string();
 }

@@ -28,7 +28,7 @@ struct Frame {
   const PoseUnknowns& unknowns;
   double film_m;
   CylinderView view;
-  // The unrolled frame's, in the camera; and the camera in it [m].
+  // Axes of the unrolled frame, in the camera; and the camera in that frame [m].
   Eigen::Matrix3d axes = unknowns.pose().camera_from_unrolled.rotation.toRotationMatrix();
   Eigen::Vector3d camera_in_unrolled = -axes.transpose() * unknowns.pose().camera_from_unrolled.translation;
 

@@ -25,7 +25,7 @@ struct FineFitLimits {
   double sharp_blur_px = 1.8;        ///< a blur below it may flicker where few sides are left
   double settled_sigmas = 0.01;      ///< a reweighting that moves the unknowns by less is the last
   double other_blur = 0.05;          ///< a change of the mean blur from one frame to the next, a fraction of it
-  double well_seen_fraction = 0.7;   ///< of the boundary points, to blame the print or the registration; of one's lines
+  double well_seen_fraction = 0.7;   ///< of the points: to blame the print or the registration; to see a boundary well
   double least_rcm_sigma_m = 1e-7;   ///< of an exact registration: a hundredth of what images show
 };
 inline constexpr FineFitLimits fine_fit_limits;

@@ -104,7 +104,7 @@ void add_pulls_of_all(std::span<const Measurement> measurements, const ResidualL
   }
 }
 
-// One sigma of each number of the rig's camera.
+// One sigma of each number of the rig's camera and marker.
 void add_pulls_of_camera(std::span<const Measurement> measurements, const ResidualLines& lines,
                          const CommonErrors& errors, PrintSums& sums) {
   std::array<CameraPull, RigErrors::most> pulls;
@@ -127,7 +127,7 @@ double certainty_of(const GroupPull& group) {
   return 1 / (group.weight + 1 / (group.error_px * group.error_px));
 }
 
-// How one sigma of a number of the camera pulls the print's errors, whatever pose, film and groups' errors are.
+// How one sigma of a number of the rig pulls the print's errors, whatever pose, film and groups' errors are.
 PrintVector print_pull_of(const CameraPull& pull, const PrintSums& sums, const PrintCrossMatrix& through) {
   UnknownVector x = pull.x;
   PrintVector n = pull.n;
@@ -140,7 +140,7 @@ PrintVector print_pull_of(const CameraPull& pull, const PrintSums& sums, const P
   return n - through * x;
 }
 
-// Errors of the print that look like one sigma of each number of the camera.
+// Errors of the print that look like one sigma of each number of the rig.
 InplaceVector<PrintVector, RigErrors::most> shapes_of_camera(const PrintInformation& print, const PrintSums& sums,
                                                              const PrintCrossMatrix& through) {
   constexpr double ridge = 1e-9;

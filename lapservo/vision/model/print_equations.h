@@ -58,7 +58,7 @@ struct GroupPull {
   }
 };
 
-/// The effect of one sigma of a number of the rig's camera on the measurements of all groups.
+/// The effect of one sigma of a number of the rig's camera or marker on the measurements of all groups.
 struct CameraPull : GroupPull {
   std::array<double, measurement_groups> by_group{};  ///< sums of weights times what it moves
 };

@@ -79,14 +79,18 @@ void print_result(const std::vector<BoardView>& views, const CameraCalibration& 
 }
 
 void write_results(const CalibrateCameraOptions& options, std::optional<Rig> rig, const Camera& camera) {
+  std::string rig_text;
+  if (rig) {
+    rig->camera = camera, rig->camera_file.clear();
+    rig_text = measured_rig_yaml(*rig, options.rig_out());
+  }
   for (const std::string& place : {options.camera_info, rig ? std::string() : options.out}) {
     if (place.empty()) continue;
     write_file(place, camera_yaml(camera));
     std::printf("camera: %s\n", place.c_str());
   }
   if (!rig) return;
-  rig->camera = camera, rig->camera_file.clear();
-  write_file(options.rig_out(), measured_rig_yaml(*rig, options.rig_out()));
+  write_file(options.rig_out(), rig_text);
   std::printf("rig: %s\n", options.rig_out().c_str());
 }
 
