@@ -1,5 +1,6 @@
 #include "lapservo/loop_topics/loop_topics.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>

@@ -187,7 +187,7 @@ std::optional<ImageMeasurement> read_image(const Row& row) {
   image.found = word == "found";
   image.time_s = row.number("image_time_s");
   const double registration = row.number("image_registration");
-  if (!(std::abs(registration) <= std::numeric_limits<int>::max()))
+  if (!(std::abs(registration) <= std::numeric_limits<int>::max()) || registration != std::trunc(registration))
     row.complain("image_registration", "a whole number");
   image.registration = static_cast<int>(registration);
   const auto repetition = repetition_from_string(row.text("image_repetition"));

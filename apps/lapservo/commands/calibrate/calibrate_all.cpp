@@ -24,6 +24,7 @@
 #include "lapservo/rig/rig.h"
 #ifdef LAPSERVO_BAGS
 #include "recordings/open_bag.h"
+#include "recordings/session.h"
 #endif
 
 namespace lapservo::app {
@@ -173,7 +174,7 @@ class Guide {
   // Topics are of bags and sessions.
   static bool has_topics([[maybe_unused]] const std::string& input) {
 #ifdef LAPSERVO_BAGS
-    return !bag_of(input).empty();
+    return !bag_of(input).empty() || is_session(input);
 #else
     return false;
 #endif

@@ -1,8 +1,8 @@
 #include <cstdio>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
-#include <set>
 #include <string>
 #include <utility>
 
@@ -83,8 +83,12 @@ class ArmWatcher : public RunWatcher {
     for (const LoopWishes::Start& start : wishes.starts)
       arm_.start({Commander::topic, start.source}, start.said_s, start.force);
     constexpr std::size_t most_said = 100;
-    for (const std::string& remark : wishes.remarks)
-      if (said_remarks_.size() < most_said && said_remarks_.insert(remark).second) say(time_s, remark);
+    constexpr double silent_s = 10;  // about what is repeated
+    for (const std::string& remark : wishes.remarks) {
+      if (next_remarks_s_.size() >= most_said && !next_remarks_s_.contains(remark)) continue;
+      double& next_s = next_remarks_s_[remark];
+      if (time_s >= next_s) say(time_s, remark), next_s = time_s + silent_s;
+    }
     if (wishes.set_point) goal_.want("set_point", 1, set_point(*wishes.set_point));
     if (wishes.tip_goal) goal_.want("tip_goal", 0, tip_set_point(*wishes.tip_goal, "tip_goal"));
     if (wishes.trajectory) goal_.want("trajectory", wishes.trajectory->duration_s, *wishes.trajectory);
@@ -117,7 +121,7 @@ class ArmWatcher : public RunWatcher {
   ChangingGoal& goal_;
   double next_counts_s_ = 0, next_set_point_s_ = 0;
   std::string said_counts_;
-  std::set<std::string> said_remarks_;
+  std::map<std::string, double> next_remarks_s_;
   bool said_ended_ = false, two_endoscopes_ = false;
   std::size_t said_motions_ = 0;
 };
