@@ -21,10 +21,9 @@
 namespace lapservo::internal {
 namespace {
 
-// Sigmas of a boundary along the line, and of the line across itself at either end: medians of absolute errors (as one
-// sigma) of `lapservo render --rig configs/example.yaml --count 60 --seed 101`, 0.6 (inner boundaries) and 0.5. In
-// dark, noisy and compressed frames the latter is 0.5 to 0.9.
-constexpr double boundary_sigma_px = 0.7, across_sigma_px = 0.5;
+// Sigmas of a boundary along the line, of the line across at an end, and of both ends outwards, where colours mix with
+// the bare shaft's: measured 0.3 to 0.5, 0.5 and 1.3 with `lapservo render --rig configs/example.yaml --count 40`.
+constexpr double boundary_sigma_px = 0.5, across_sigma_px = boundary_sigma_px, outwards_sigma_px = 1.3;
 constexpr double widest_hue_deg = 30;
 constexpr int min_saturation = 60, min_value = 40, min_area_px = 150;
 
@@ -219,12 +218,12 @@ double tau_from(const CrossRatioDecoder& decoder, const Edges& e) {
 
 using EdgesVector = Eigen::Matrix<double, 8, 1>;
 
-// Uncertainties of the boundaries, one sigma each: each errs along the line by itself, by `along_px`; all turn and
-// shift across with the line's ends.
-std::array<EdgesVector, 6> errors_of(const Edges& edges, double along_px) {
+// Uncertainties of the boundaries, one sigma each: each errs along the line by itself, by `along_px`, both ends
+// together; all turn and shift across with the line's ends.
+std::array<EdgesVector, 7> errors_of(const Edges& edges, double along_px) {
   const double length_px = (edges[3] - edges[0]).norm();
   const Eigen::Vector2d along = (edges[3] - edges[0]) / length_px, across(-along.y(), along.x());
-  std::array<EdgesVector, 6> errors;
+  std::array<EdgesVector, 7> errors;
   errors.fill(EdgesVector::Zero());
   for (std::size_t k = 0; k < 4; ++k) {
     const Eigen::Index place = 2 * static_cast<Eigen::Index>(k);
@@ -233,6 +232,7 @@ std::array<EdgesVector, 6> errors_of(const Edges& edges, double along_px) {
     errors[4].segment<2>(place) = (1 - fraction) * across_sigma_px * across;
     errors[5].segment<2>(place) = fraction * across_sigma_px * across;
   }
+  errors[6].head<2>() = -outwards_sigma_px * along, errors[6].tail<2>() = outwards_sigma_px * along;
   return errors;
 }
 
