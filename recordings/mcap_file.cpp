@@ -277,7 +277,8 @@ class Summary {
     while (const auto channel = taken<std::uint16_t>(*counts)) {
       const auto counted = taken<std::uint64_t>(*counts);
       const auto topic = contents_.channels.topics.find(*channel);
-      if (!counted || topic == contents_.channels.topics.end()) return false;
+      const bool is_known = topic != contents_.channels.topics.end() && !topic->second.type.empty();
+      if (!counted || !is_known) return false;  // schemas need not be repeated
       const auto times = times_.try_emplace(*channel, *first_ns, *last_ns).first->second;
       if (*counted > 0) count(topic->second, *counted, times.first, times.second);
     }

@@ -126,7 +126,7 @@ Update OffsetObserver::start(const FeatureModel& model, const Eigen::Vector4d& q
   }
   if (!found) return Update::not_modelled;
   Eigen::Vector4d offset = found->q - q_driven_then;
-  offset[3] = wrap_pi(offset[3]);  // the image knows no turns of psi
+  for (const Eigen::Index k : {0, 3}) offset[k] = wrap_pi(offset[k]);  // the image knows no turns of theta and psi
   offset = within_limits(offset);
   const auto limited = model(q_driven_then + offset);
   if (!limited) return Update::not_modelled;

@@ -182,16 +182,16 @@ TEST(OffsetObserver, RejectsAnOutlierAndReacquires) {
   EXPECT_LT((world.observer.offset() - world.offset).norm(), 0.02);
 }
 
-// An image gives the rotation within one turn, the measured joints count turns.
+// An image gives theta and psi within one turn, the measured joints count turns.
 TEST(OffsetObserver, TakesTheTurnOfTheMeasuredJoints) {
   const TestRig rig;
   const Scales scales;
   OffsetObserver observer(ObserverConfig{}, scales);
   JointHistory history;
-  const Eigen::Vector4d q_joint(0.05, 1.57, 0.064, 3.12), offset(0.01, -0.01, 0.001, 0.04);
+  const Eigen::Vector4d q_joint(0.05 + two_pi, 1.57, 0.064, 3.12), offset(0.01, -0.01, 0.001, 0.04);
   for (int i = 0; i < 60; ++i) history.push(i * period_s, q_joint);
   ImageMeasurement image = testing::image_of(exact_map(rig, q_joint + offset).value(), 59 * period_s);
-  image.q = q_joint + offset - Eigen::Vector4d(0, 0, 0, two_pi);
+  image.q = q_joint + offset - Eigen::Vector4d(two_pi, 0, 0, two_pi);
   EXPECT_EQ(observer.update(testing::model_of(rig), history, image), Update::reacquired);
   EXPECT_LT((observer.offset() - offset).norm(), 1e-6);
 }

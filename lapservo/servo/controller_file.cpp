@@ -66,6 +66,10 @@ std::optional<double> read_delay(const YamlField& field) {
   return field.number(expected);
 }
 
+TrackingGains usual_gains(ControlMode mode, double period_s) {
+  return mode == ControlMode::paper ? paper_gains(period_s) : TrackingGains();
+}
+
 std::string list_of(const Eigen::Vector4d& v) {
   return fmt::format("[{}, {}, {}, {}]", v[0], v[1], v[2], v[3]);
 }
@@ -79,8 +83,8 @@ ControllerConfig load_controller(const std::filesystem::path& path, const Contro
   expect_keys(file, {{"mode", "period_s", "gains_per_s", "delay_s", "model_error", "limits", "window"}, {}});
   if (const YamlField mode = file["mode"]; mode.present()) config.mode = read_mode(mode);
   if (const YamlField period = file["period_s"]; period.present()) config.period_s = period.number("a finite number");
-  const bool has_gains = file["gains_per_s"].present() || base.gains.per_s != TrackingGains().per_s;
-  if (config.mode == ControlMode::paper && !has_gains) config.gains = paper_gains(config.period_s);
+  if (base.gains.per_s == usual_gains(base.mode, base.period_s).per_s)
+    config.gains = usual_gains(config.mode, config.period_s);
   if (const YamlField gains = file["gains_per_s"]; gains.present()) config.gains.per_s = four(gains);
   if (const YamlField delay = file["delay_s"]; delay.present()) config.observer.delay_s = read_delay(delay);
   if (const YamlField error = file["model_error"]; error.present())

@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "lapservo/control/tracking_law.h"
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
 
@@ -55,6 +56,12 @@ TEST(ControllerFile, WhatIsMissingStays) {
   EXPECT_FALSE(read.observer.delay_s);
   EXPECT_EQ(read.gains.per_s, unusual().gains.per_s);
   EXPECT_EQ(read.mode, ControlMode::paper);
+}
+
+TEST(ControllerFile, GainsThatNobodyGaveAreThoseOfModeAndPeriod) {
+  const ControllerConfig base = paper_controller(1.0 / 60);
+  EXPECT_EQ(load_controller(File("period_s: 0.01\n").path(), base).gains.per_s, paper_gains(0.01).per_s);
+  EXPECT_EQ(load_controller(File("mode: fused\n").path(), base).gains.per_s, TrackingGains().per_s);
 }
 
 TEST(ControllerFile, NamesFileFieldValueAndExpectation) {

@@ -92,16 +92,19 @@ void EndoscopeRecovery::see(const ServoInput& input, VisualController& controlle
 
 void EndoscopeRecovery::collect(const ImageMeasurement& image, VisualController& controller) {
   if (!image.camera_from_marker || !sees_from_start_) return;
+  const std::size_t before = seen_.size();
   add(seen_, sighting(image, *measured_), max_compared);
+  if (seen_.size() != before) ++sightings_;
   // The operator's motion may show which number it is.
-  if (const auto why = wrong_rig(); why && why->cause == Explanation::Cause::rig && seen_.size() >= explain_at_)
+  if (const auto why = wrong_rig(); why && why->cause == Explanation::Cause::rig && sightings_ >= explain_at_)
     blames_rig(controller, Blame::named);
 }
 
 // Whether the rig was wrong from the start.
 bool EndoscopeRecovery::blames_rig(VisualController& controller, Blame wanted) {
   const Explanation why = explain_disagreement(seen_, instrument());
-  explain_at_ = std::min(max_compared, explained_again_after * seen_.size());
+  const std::size_t again = std::min(max_compared, explained_again_after * seen_.size());
+  explain_at_ = sightings_ + std::max<std::size_t>(1, again - std::min(again, seen_.size()));
   if (!why.is_of_the_rig() || (wanted != Blame::any && why.cause == Explanation::Cause::rig)) return false;
   if (wanted == Blame::sign && why.cause != Explanation::Cause::sign) return false;
   state_ = WrongRig{why};
@@ -158,7 +161,7 @@ void EndoscopeRecovery::doubt(HoldReason reason, VisualController& controller) {
   const bool watches = std::holds_alternative<Watching>(state_);
   // Another registration or offset does not make an image stand still.
   const bool still = reason == HoldReason::image_not_following;
-  if ((still || reason == HoldReason::psi_contradicted) && watches && seen_.size() >= explain_at_)
+  if ((still || reason == HoldReason::psi_contradicted) && watches && sightings_ >= explain_at_)
     blames_rig(controller, still ? Blame::sign : Blame::named);
   if (reason != HoldReason::wild_joints && reason != HoldReason::frozen_image) return;
   seen_.clear();
@@ -252,8 +255,9 @@ std::optional<MarkerSighting> EndoscopeRecovery::sighting_of(const ImageMeasurem
 void EndoscopeRecovery::wait_for_motion(WaitingForMotion& waiting, const MarkerSighting& seen,
                                         VisualController& controller) {
   Sightings& sightings = waiting.sightings;
+  const std::size_t before = sightings.size();
   add(sightings, seen, max_images);
-  if (sightings.size() < waiting.fit_at) return;
+  if (sightings.size() == before || sightings.size() < waiting.fit_at) return;
   const auto found = fit(sightings);
   const bool contradicts = found && contradicts_itself(*found);
   if (found && !contradicts && is_certain(*found)) {

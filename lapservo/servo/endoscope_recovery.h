@@ -109,7 +109,7 @@ class EndoscopeRecovery {
   std::variant<Watching, WaitingForMotion, WaitingForStart, WrongRig> state_;
   endoscope::Sightings seen_;                    ///< since the loop has gone by this registration
   bool sees_from_start_ = true;                  ///< nothing but that made joints or images doubtful since then
-  std::size_t explain_at_ = 0;                   ///< so many
+  std::size_t sightings_ = 0, explain_at_ = 0;   ///< how many were added to seen_ that moved; explained at so many
   int agreeing_ = 0;                             ///< images so far, at most 10
   std::optional<endoscope::Measured> measured_;  ///< at the latest image
   std::optional<SeenJoints> seen_joints_;        ///< in it, by the registration that the loop goes by

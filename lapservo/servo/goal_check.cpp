@@ -46,6 +46,8 @@ class Reach {
     constexpr double last_spread = 1e-4;
     const JointLimits& limits = config_.limits;
     const auto wanted = goal.position_m.z() > 0 ? tips_.configuration(goal) : std::nullopt;
+    if (wanted && !(wanted->psi_rad >= limits.lower[3] && wanted->psi_rad <= limits.upper[3]))
+      return fmt::format("; rolls of {:.4g} to {:.4g} rad can be reached", limits.lower[3], limits.upper[3]);
     Random random(1);
     Eigen::Vector4d best = joints_.q.vector();
     if (wanted) best[3] = wanted->psi_rad;

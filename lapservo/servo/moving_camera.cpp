@@ -54,7 +54,10 @@ void MovingCamera::carry(ServoInput& input, double since_s, const Trajectory& tr
                          const Rigid3& first_from_camera) {
   const Eigen::Vector4d q = input.joints.q.vector();
   if (!begun_ && !q.allFinite()) return;
-  if (!std::exchange(begun_, true)) wanted_ = q, last_ = input.desired;
+  const bool begins = !std::exchange(begun_, true);
+  if (begins) last_ = input.desired;
+  // An arm that the loop does not move is brought elsewhere by others.
+  if (begins || (q.allFinite() && input.joints.operating_state != OperatingState::enabled)) wanted_ = q;
   const auto now = features_in_first(input.time_s, input.desired.features);
   if (first_from_rcm_ && !now) input.image.reset();
   if (input.image) carry(*input.image, first_from_camera, q);

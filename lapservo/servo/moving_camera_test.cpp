@@ -124,6 +124,27 @@ TEST(MovingCamera, GoesOnAfterJointsThatAreNoneAndGoalsOutOfReach) {
   EXPECT_TRUE(image_counts(there, goal));
 }
 
+// A goal is looked for from where the arm is when the loop begins to move it, not from where others had it.
+TEST(MovingCamera, GoalsAreLookedForFromWhereTheArmIsEnabled) {
+  const Rig rig = testing::small_test_rig();
+  const Evenly endoscope;
+  MovingCamera camera(endoscope, rig, {});
+  const double time_s = 3;
+  const FeatureModel here =
+      feature_model(rig, endoscope.first_from_camera(time_s)->inverse() * *rig.instruments[0].camera_from_rcm);
+  const Eigen::Vector4d goal = here(there.vector())->features;
+  for (const JointVector& q : {JointVector{0, pi / 2, -0.0156, 0}, there}) {
+    ServoInput input = input_at(time_s, q);
+    input.joints.operating_state = OperatingState::paused;
+    for (int i = 0; i < 2; ++i, input.joints.operating_state = OperatingState::enabled) {
+      if (i == 1 && q.rho_m < 0) break;  // others bring it elsewhere first
+      input.desired.features = goal;
+      camera.carry(input, 0, set_point(goal), *endoscope.first_from_camera(time_s));
+    }
+    if (q.rho_m > 0) EXPECT_LT((input.desired.features - feature_model(rig)(there.vector())->features).norm(), 1e-6);
+  }
+}
+
 // The covariance is that of registrations whose first one, and whose motion, are drawn from their own.
 TEST(MovingCamera, TheMotionsUncertaintyIsAdded) {
   Instrument instrument = testing::small_test_rig().instruments[0];

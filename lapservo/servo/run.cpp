@@ -100,11 +100,17 @@ struct FirstSight {
       refuse_other_clock("ImageStream", tick.seen->image.time_s, tick.input.time_s);
     const JointState& joints = tick.input.joints;
     // While it is held, others still bring it to where the loop will begin.
-    if (!joints.q.vector().allFinite() || arm.held() || std::exchange(saw_joints, true)) return;
+    if (!joints.q.vector().allFinite() || arm.held() || saw_joints) return;
+    auto camera_from_rcm = config.rig.instruments.at(0).camera_from_rcm;
+    if (config.endoscope && camera_from_rcm) {  // which may have moved meanwhile
+      const auto first_from_camera = config.endoscope->first_from_camera(tick.input.time_s);
+      if (!first_from_camera) return;
+      camera_from_rcm = first_from_camera->inverse() * *camera_from_rcm;
+    }
+    saw_joints = true;
     refuse_other_clock("JointState", joints.time_s, tick.input.time_s);
     if (arm.is_simulated() && !joints.follows) return;
-    refuse_goal(trajectory, duration_s, config.rig, config.rig.instruments.at(0).camera_from_rcm, controller, joints,
-                config.trajectory_name);
+    refuse_goal(trajectory, duration_s, config.rig, camera_from_rcm, controller, joints, config.trajectory_name);
   }
 };
 

@@ -137,7 +137,9 @@ std::optional<JointVector> TipGoals::configuration(const TipGoal& goal, double a
   auto q = goal.camera_from_tip ? configuration_of_tip(*camera_from_rcm_, marker, *tip, place_m, *goal.camera_from_tip)
                                 : configuration_of_tip(*camera_from_rcm_, marker, tip->translation, place_m,
                                                        goal.roll_rad.value_or(psi_rad_));
-  if (q) q->psi_rad = psi_rad_ + wrap_pi(q->psi_rad - psi_rad_);
+  if (!q) return std::nullopt;
+  q->theta_rad = q_[0] + wrap_pi(q->theta_rad - q_[0]);
+  q->psi_rad = psi_rad_ + wrap_pi(q->psi_rad - psi_rad_);
   return q;
 }
 

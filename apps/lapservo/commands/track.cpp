@@ -161,7 +161,8 @@ class RigByFrame {
 
   Tracker& tracker_for(const Frame& frame) {
     if (options_.rig.empty()) {
-      const fs::path at = frame.file.empty() ? fs::path(options_.input) : frame.file;
+      fs::path at = frame.file.empty() ? fs::path(options_.input) : frame.file;
+      if (!at.has_filename()) at = at.parent_path();  // a folder's name may end in /
       const fs::path own = sidecar(at), shared = at.parent_path() / "rig.yaml";
       std::error_code error;
       const fs::path chosen = fs::exists(own, error) ? own : shared;

@@ -73,7 +73,8 @@ VideoEncoder::VideoEncoder(const std::filesystem::path& path, const std::string&
     : shown_(shown) {
   av_log_set_level(AV_LOG_QUIET);
   AVFormatContext* file = nullptr;
-  avformat_alloc_output_context2(&file, av_guess_format(nullptr, shown.c_str(), nullptr), nullptr, path.c_str());
+  avformat_alloc_output_context2(&file, av_guess_format(nullptr, shown.c_str(), nullptr), nullptr,
+                                 ("file:" + path.string()).c_str());
   if (!file) refuse();
   file_.reset(file);
   open_codec(size, frames_per_second, use);

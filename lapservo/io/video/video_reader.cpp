@@ -157,10 +157,18 @@ class VideoReader::State {
   // A file may have a colon in its name.
   std::string url() const { return kind_ == Kind::file ? "file:" + source_ : source_; }
 
-  std::size_t choose_stream() const {
-    const int chosen = av_find_best_stream(format_.get(), AVMEDIA_TYPE_VIDEO, -1, -1, nullptr, 0);
-    if (chosen < 0) throw InputError(source_, "has no frames, expected a video");
-    return static_cast<std::size_t>(chosen);
+  // The first, whatever the others' sizes and bit rates are: recorders of two eyes may write a track for each.
+  std::size_t choose_stream() {
+    std::optional<std::size_t> first;
+    for (unsigned i = 0; i < format_->nb_streams; ++i) {
+      const AVStream& stream = *format_->streams[i];
+      const bool is_cover = (stream.disposition & AV_DISPOSITION_ATTACHED_PIC) != 0;
+      if (stream.codecpar->codec_type != AVMEDIA_TYPE_VIDEO || is_cover) continue;
+      if (!first) first = i;
+      ++tracks_;
+    }
+    if (!first) throw InputError(source_, "has no frames, expected a video");
+    return *first;
   }
 
   void open_decoder() {
@@ -201,8 +209,9 @@ class VideoReader::State {
   // begins.
   void look_at_end(const AVPacket& packet) {
     if (stream_->nb_frames > 0 || packet.pts == AV_NOPTS_VALUE) return;
-    const double begin_s =
-        format_->start_time == AV_NOPTS_VALUE ? 0 : static_cast<double>(format_->start_time) / AV_TIME_BASE;
+    // A stream's own duration counts from its beginning, that of a file from 0.
+    const bool of_stream = stream_->duration > 0 && format_->start_time != AV_NOPTS_VALUE;
+    const double begin_s = of_stream ? static_cast<double>(format_->start_time) / AV_TIME_BASE : 0;
     const double unit_s = av_q2d(format_->streams[packet.stream_index]->time_base);
     end_of_all_s_ = std::max(end_of_all_s_, static_cast<double>(packet.pts + packet.duration) * unit_s - begin_s);
   }
@@ -287,6 +296,10 @@ class VideoReader::State {
           fmt::format("names no times and no rate: read as {:.6g} frames/s (ffmpeg -framerate RATE -i IN -c copy "
                       "OUT.mp4 writes them)",
                       frames_per_second()));
+    if (tracks_ > 1)
+      remarks.push_back(fmt::format(
+          "has {} video tracks, of which the first is read (ffmpeg -i IN -map 0:v:1 -c copy OUT takes out another)",
+          tracks_));
     std::erase(remarks, "");
     remark_ = fmt::format("{}", fmt::join(remarks, "; "));
   }
@@ -336,6 +349,7 @@ class VideoReader::State {
   double first_s_ = 0;            // the first frame's stamp
   bool stamped_ = false;          // a frame had a stamp
   int packets_ = 0, frames_ = 0, damaged_ = 0;
+  int tracks_ = 0;        // of video
   bool tainted_ = false;  // a packet since the last frame was damaged on its way
   bool spoiled_ = false;  // the last frame is damaged
 };
