@@ -132,6 +132,8 @@ TEST_F(Outputs, NeverGoOverInputs) {
   for (const char* arguments : {"track frames/0001.png --out frames/rig.yaml", "track frames --out new.mp4",
                                 "check frames --rig rig.yaml --out new.csv"})
     expect_refused(arguments, {"one that ends in"});
+  for (const char* step : {"marker frames", "camera frames --board 9x6 --square-mm 5"})
+    expect_refused(std::string("calibrate ") + step + " --rig rig.yaml --out cam.yaml", {"a whole rig would replace"});
   expect_refused("marker design --diameter-mm 8.4 --distance-mm 100 --out rig.yaml", {"is a rig", "marker"});
   EXPECT_EQ(snapshot(), before);
 }

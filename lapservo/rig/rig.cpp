@@ -21,6 +21,7 @@
 #include "lapservo/rig/check_rig.h"
 #include "lapservo/rig/matrix_field.h"
 #include "lapservo/rig/response_field.h"
+#include "lapservo/rig/rig_files.h"
 #include "lapservo/rig/tool_field.h"
 
 namespace lapservo {
@@ -169,8 +170,7 @@ Camera parse_camera_fields(const YamlField& field) {
 
 Camera parse_camera(const YamlField& field, const fs::path& folder) {
   if (!field.is_scalar()) return parse_camera_fields(field);
-  const fs::path path = folder / field.text("a map or the path of a camera file");
-  return parse_camera_fields(YamlField::parse(with_rig_keys(read_yaml(path), path.string()), path.string(), file_kind));
+  return load_camera(folder / field.text("a map or the path of a camera file"));
 }
 
 MarkerSigmas parse_marker_sigmas(const YamlField& marker) {
@@ -296,6 +296,10 @@ Rig parse_root(const YamlField& root, const fs::path& folder) {
 }
 
 }  // namespace
+
+Camera internal::load_camera(const fs::path& path) {
+  return parse_camera_fields(YamlField::parse(with_rig_keys(read_yaml(path), path.string()), path.string(), file_kind));
+}
 
 Rig parse_rig(std::string_view yaml, const std::string& source, const fs::path& folder) {
   return parse_root(YamlField::parse(yaml, source, file_kind), folder);

@@ -1,8 +1,14 @@
 #pragma once
 
+#include <filesystem>
+
+#include "lapservo/geometry/camera.h"
 #include "lapservo/rig/rig.h"
 
 namespace lapservo::internal {
+
+/// The camera of a file that a rig's `camera` may name. Throws InputError as load_rig().
+Camera load_camera(const std::filesystem::path& path);
 
 /// `use` of each path that a rig names: the camera's file and the tools'.
 template <typename AnyRig, typename Use>

@@ -11,6 +11,10 @@
 #include <fmt/ranges.h>
 #include <yaml-cpp/yaml.h>
 
+#include "lapservo/core/error.h"
+#include "lapservo/rig/rig_files.h"
+#include "lapservo/tool/dvrk_tool_file.h"
+
 namespace lapservo::internal {
 namespace {
 namespace fs = std::filesystem;
@@ -240,6 +244,21 @@ std::string measured_rig_yaml(const Rig& rig, const fs::path& destination) {
   parse_rig(yaml, fmt::format("{} as it would be written", destination.empty() ? "rig" : destination.string()),
             destination.parent_path());
   return yaml;
+}
+
+void refuse_rig_over_part(const fs::path& destination) {
+  const auto is_read_by = [&](const auto& read) {
+    try {
+      read(destination);
+      return true;
+    } catch (const InputError&) {
+      return false;
+    }
+  };
+  std::error_code error;
+  if (fs::is_regular_file(destination, error) && (is_read_by(load_camera) || is_read_by(read_dvrk_tool)))
+    throw InputError(destination.string(),
+                     "is the file of a camera or a tool, which a whole rig would replace: expected another name");
 }
 
 }  // namespace lapservo::internal

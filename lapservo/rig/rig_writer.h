@@ -14,6 +14,9 @@ std::string rig_yaml(const Rig& rig, const std::filesystem::path& destination = 
 /// The same of a rig that was measured. Throws InputError naming the file where parse_rig() would not take it.
 std::string measured_rig_yaml(const Rig& rig, const std::filesystem::path& destination);
 
+/// Throws InputError where a rig would replace the file of a camera or a tool, which rigs may name.
+void refuse_rig_over_part(const std::filesystem::path& destination);
+
 /// The lines of a camera file, or of a rig's `camera`, each after so many spaces.
 std::string camera_yaml(const Camera& camera, int indent = 0);
 

@@ -8,10 +8,15 @@
 
 #include "lapservo/core/random.h"
 #include "lapservo/rig/rig.h"
+#include "lapservo/testing/has.h"
+#include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
+#include "lapservo/tool/test_tools.h"
 
 namespace lapservo::internal {
 namespace {
+using testing::has;
+using testing::input_error;
 
 constexpr auto every_key = R"(camera:
   image_width: 640
@@ -160,6 +165,17 @@ TEST(RigWriter, NamesACamerasFileFromWhereverTheRigGoes) {
     EXPECT_EQ(moved.instruments, rig.instruments) << place;
   }
   EXPECT_EQ(rig_yaml(rig), every_key) << "on its own";
+}
+
+TEST(RigWriter, ReplacesNoFileOfACameraOrATool) {
+  const testing::TemporaryFolder folder;
+  testing::write_file(folder / "camera.yaml", camera_yaml(parse_rig(every_key, "rig.yaml").camera));
+  testing::write_file(folder / "tool.json", invented_tool_json);
+  testing::write_file(folder / "rig.yaml", every_key);
+  std::filesystem::create_symlink("camera.yaml", folder / "link.yaml");
+  for (const char* part : {"camera.yaml", "tool.json", "link.yaml"})
+    EXPECT_TRUE(has(input_error([&] { refuse_rig_over_part(folder / part); }), "rig would replace")) << part;
+  for (const char* place : {"rig.yaml", "new.yaml", "."}) EXPECT_NO_THROW(refuse_rig_over_part(folder / place));
 }
 
 }  // namespace

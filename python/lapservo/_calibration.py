@@ -53,7 +53,7 @@ class Calibration:
     def save(self, path: _Path) -> None:
         """Writes `yaml`, whole or not at all; a camera's own file is named so that it is found from there.
 
-        Raises InputError at that file's own path: there it would be lost.
+        Raises InputError where a rig would replace the file of a camera or a tool.
         """
         _core._write_calibrated(self.rig, self.yaml, path)
 

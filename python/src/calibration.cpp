@@ -1,7 +1,6 @@
 #include <filesystem>
 #include <optional>
 #include <string>
-#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -287,9 +286,7 @@ void bind_calibration(py::module_& m) {
   m.def("_calibrate_marker", &calibrate_marker);
   m.def("_calibrate_registration", &calibrate_registration);
   m.def("_write_calibrated", [](const std::optional<Rig>& rig, const std::string& yaml, const fs::path& path) {
-    std::error_code error;
-    if (rig && !rig->camera_file.empty() && fs::equivalent(rig->camera_file, path, error))
-      throw InputError(path.string(), "is the camera's own file, which the rig names, expected another path");
+    if (rig) refuse_rig_over_part(path);
     write_file(path, rig ? measured_rig_yaml(*rig, path) : yaml);
   });
 }

@@ -230,9 +230,10 @@ with the field, its value and what was expected.)");
       .def(
           "save",
           [](const Rig& rig, const std::filesystem::path& path) {
+            internal::refuse_rig_over_part(path);
             internal::write_file(path, internal::rig_yaml(rig));
           },
-          py::arg("path"), "Writes to_yaml(), whole or not at all.")
+          py::arg("path"), "Writes to_yaml(), whole or not at all; never over the file of a camera or a tool.")
       .def(
           "to_yaml", [](const Rig& rig) { return internal::rig_yaml(rig); },
           "Text that Rig.parse reads back to the last bit, the camera and all sigmas included.")

@@ -149,13 +149,14 @@ def test_a_cameras_own_file_is_named_from_anywhere_and_never_written_over(record
     (elsewhere / "link.yaml").symlink_to(lens)
     before = lens.read_bytes()
     for path in (lens, "../home/lens/camera.yaml", "link.yaml"):
-        assert "the camera's own file" in refused(result.save, path).problem
+        assert "the file of a camera" in refused(result.save, path).problem
         assert refused(lapservo.calibrate_colour(images[:12], lapservo.Rig.load(home / "rig.yaml"), fps=FPS).save, path)
     monkeypatch.chdir(home)
     loaded = lapservo.Rig.load("rig.yaml")
     monkeypatch.chdir(elsewhere)
     for rig in (loaded, pickle.loads(pickle.dumps(loaded))):
         assert refused(lapservo.calibrate_colour(images[:12], rig, fps=FPS).save, lens)
+        assert refused(rig.save, lens) and refused(lapservo.Rig(rig.camera, rig.instruments).save, lens)
     assert lens.read_bytes() == before
 
 

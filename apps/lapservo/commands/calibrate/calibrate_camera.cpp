@@ -35,6 +35,7 @@ void check_files(const CalibrateCameraOptions& options, const std::optional<Rig>
     refuse_over_rig(place, "camera");
   }
   if (!rig) return;
+  refuse_rig_over_part(options.rig_out());
   files.add_rig(options.rig, *rig);
   files.refuse_as_output(options.camera_info);
 }

@@ -64,6 +64,7 @@ void refuse_outputs_over_inputs(const CalibrateOptions& options, const Rig& rig)
   refuse_shared_place({options.out, options.report, options.dvrk.base_frame});
   refuse_other_kind(options.out, ".yaml"), refuse_other_kind(options.report, ".html");
   refuse_other_kind(options.dvrk.base_frame, ".json");
+  refuse_rig_over_part(options.out);
   inputs.add_rig(options.rig, rig);
   inputs.refuse_as_output(options.report);
   inputs.refuse_as_output(options.dvrk.base_frame);

@@ -46,7 +46,8 @@ inline std::size_t instrument_meant(const Rig& rig, const CalibrateOptions& opti
   return named_instrument(rig, options.instrument, options.rig);
 }
 
-/// Throws InputError when a result would go over an input or another result, or check's page over the rig.
+/// Throws InputError when a result would go over an input or another result, a page over the rig, or
+/// the rig over its camera's or tools' files.
 void refuse_outputs_over_inputs(const CalibrateOptions& options, const Rig& rig);
 
 /// Prints on stderr the parts that a source could not read.
