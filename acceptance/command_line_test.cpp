@@ -753,12 +753,18 @@ TEST_F(CommandLine, SamplesGoIntoAnEmptyFolder) {
   expect_refused("sample in", {"in: is not empty, expected a new or an empty folder"});
 }
 
-TEST_F(CommandLine, CalibrationsRefuseWhatTheyWouldIgnore) {
+TEST_F(CommandLine, CalibrationsAndRecordingsRefuseWhatTheyWouldIgnore) {
   const std::string to = " --rig configs/example.yaml --out out/rig.yaml";
   expect_refused("calibrate registration in/seen.csv --fps 8" + to, {"--fps: is of frames", "a CSV"});
   expect_refused("calibrate tip --calliper 20 --eye left" + to, {"--eye", "--pivot"});
   expect_refused("calibrate tip --calliper 20 --deinterlace" + to, {"--deinterlace", "--touch"});
   expect_refused("calibrate tip --pivot in/tip --board 9x6" + to, {"--board", "--touch"});
+  const std::string record = "record --camera ros2:/image --out out/bag ";
+  for (const std::string idle : {"--instrument PSM1", "--scale 3", "--setpoint-readers 2", "--enable-motion"})
+    expect_refused(record + idle, {idle.substr(0, idle.find(' ')), "expected --move"});
+  expect_refused(record + "--joint-limits configs/joint_limits/psm-si.yaml", {"--joint-limits", "expected --move"});
+  for (const std::string idle : {"--scale 3", "--duration 9"})
+    expect_refused(record + "--move turn " + idle, {idle.substr(0, idle.find(' ')), "expected --move swing"});
 }
 
 TEST_F(CommandLine, CalibrateCameraRefusesBadInput) {

@@ -251,7 +251,16 @@ std::string wait_for_end(const RecordOptions& options, const Clock& clock, Recor
     }
     std::this_thread::sleep_for(std::chrono::duration<double>(MotionFollower::period_s));
   }
-  return "";
+  return arm ? "stopped before the motion ended" : "";
+}
+
+// Throws InputError for an option that would be ignored.
+void refuse_unused(const RecordOptions& options, const Command& command) {
+  if (options.move.empty())
+    command.refuse({"--instrument", "--scale", "--setpoint-readers", "--joint-limits", "--enable-motion"},
+                   "is of a motion, expected --move with it");
+  if (options.move == "turn")
+    command.refuse({"--duration", "--scale"}, "does not change a turn, expected --move swing with it");
 }
 
 }  // namespace
@@ -291,7 +300,8 @@ void add_record(Command app, Run& run_later) {
       .required();
   command.add_option("--rig", options->rig,
                      "Its camera's size is that of /dev/videoN, else GStreamer's choice; also for --move");
-  command.add_option("--duration", options->duration_s, "Seconds, from the first image on").number_between(1, 3600);
+  command.add_option("--duration", options->duration_s, "Seconds, from the first image on; a turn takes its own time")
+      .number_between(1, 3600);
   command.add_option("--fps", options->fps, "Keep no more images a second than about so many").number_between(1, 1000);
   command
       .add_option("--move", options->move,
@@ -316,7 +326,7 @@ void add_record(Command app, Run& run_later) {
       "--joint-limits.\n"
       "Example:\n  lapservo record --camera ros2:/endoscope/image_raw --robot ros2:PSM1 --out swing\n"
       "  lapservo calibrate registration swing --rig rig.yaml --out rig.yaml");
-  command.runs(run_later, [options] { return record(*options); });
+  command.runs(run_later, [options, command] { return refuse_unused(*options, command), record(*options); });
 }
 
 }  // namespace lapservo::app
