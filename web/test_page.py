@@ -407,6 +407,7 @@ def see_a_picture(browser, tool, rig, picture, folder):
         see_units(browser)
         see_no_broken_image(browser)
         assert browser.value("document.getElementById('start').hidden"), "nothing here can be started"
+        assert browser.value("document.getElementById('note').textContent") == ""
         assert not browser.complaints, browser.complaints
         look(browser, folder, "view")
         time.sleep(1)

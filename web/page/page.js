@@ -74,7 +74,7 @@ function showState(state) {
   at("start").hidden = !state.has_loop || state.has_run_button;
   at("run").hidden = !state.has_run_button;
   if (!at("note").dataset.said)
-    text(at("note"), state.has_loop && !state.may_start ? "Start needs lapservo servo --enable-motion." : at("start").disabled ? "Start needs an arm that is ready." : "");
+    text(at("note"), !state.has_loop ? "" : !state.may_start ? "Start needs lapservo servo --enable-motion." : at("start").disabled ? "Start needs an arm that is ready." : "");
   showLoop(state);
   showAnswer(state.loop);
   at("instruments").replaceChildren(...state.instruments.map(instrumentTable));
