@@ -242,7 +242,8 @@ std::string wait_for_end(const RecordOptions& options, const Clock& clock, Recor
                      names_topic(options.camera) ? transports.unpublished(options.camera, "--camera") : std::string());
     if (!options.robot.empty() && counts.joints == 0 && now_s > begin_s + patience_s)
       return missing("measured_js", counts, transports.unpublished(options.robot, "--robot", "measured_js"));
-    if (const auto ended = recording.ended()) return *ended;
+    if (const auto ended = recording.ended())
+      return ended->empty() && arm ? "its images have ended before the motion" : *ended;
     if (first_s && arm && now_s > last_image_s + max_silence_s) return "its images have stopped";
     if (first_s && arm) {
       if (const auto ended = arm->advance()) return *ended;
