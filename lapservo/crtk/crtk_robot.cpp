@@ -129,6 +129,11 @@ JointState CrtkRobot::state() {
   return interlock_.state(clock_.now_s());
 }
 
+JointState CrtkRobot::latest() const {
+  const std::lock_guard lock(mutex_);
+  return interlock_.latest(clock_.now_s());
+}
+
 std::vector<JointReading> CrtkRobot::readings() {
   const std::lock_guard lock(mutex_);
   return interlock_.take_readings();

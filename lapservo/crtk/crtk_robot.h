@@ -31,6 +31,8 @@ class CrtkRobot : public Robot {
   void send(const JointPath& path) override;
   void release() override;
 
+  /// For onlookers, in any thread: what state() has to report stays noted.
+  JointState latest() const;
   InterlockCounts counts() const;
   std::optional<Eigen::Vector4d> set_point() const;
   /// "real-time priority and locked memory", or the part of them that the system did not grant for setpoints.

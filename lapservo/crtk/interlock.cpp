@@ -279,9 +279,15 @@ void Interlock::stop(Blocked why) {
 
 JointState Interlock::state(double now_s) {
   watch(now_s);
+  JointState state = latest(now_s);
+  state.blocked = std::exchange(untold_, Blocked::none);
+  return state;
+}
+
+JointState Interlock::latest(double now_s) const {
   JointState state;
   state.follows = config_.motion_enabled;
-  state.blocked = std::exchange(untold_, Blocked::none);
+  state.blocked = blocked(now_s);
   if (measured_) state.time_s = measured_->time_s, state.q = JointVector::from_vector(measured_->q);
   if (measured_) state.wrist_rad = measured_->wrist_rad;
   if (!operating_state_) return state;

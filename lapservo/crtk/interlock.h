@@ -85,6 +85,8 @@ class Interlock {
   void release() { released_ = true; }
   /// Robot::state.
   JointState state(double now_s);
+  /// As all is now, for onlookers: what state() has to report stays noted.
+  JointState latest(double now_s) const;
   /// Robot::readings.
   std::vector<JointReading> take_readings() { return readings_.take(); }
   /// Call it every period: the setpoint of all the arm's joints to send now, if any.

@@ -327,6 +327,7 @@ TEST(Interlock, TellsOfAFaultHoweverShort) {
     bench.interlock.follow(bench.path);
     bench.pass(0.01);
     EXPECT_EQ(bench.sent_count, sent);
+    EXPECT_EQ(bench.interlock.latest(bench.now_s).blocked, Blocked::none);  // takes nothing from the loop
     EXPECT_EQ(bench.interlock.state(bench.now_s).blocked, fault.blocked);
     EXPECT_EQ(bench.interlock.state(bench.now_s).blocked, Blocked::none);
   }

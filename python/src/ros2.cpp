@@ -20,6 +20,7 @@
 #include "python/src/bindings.h"
 #include "python/src/controller.h"
 #include "python/src/conversions.h"
+#include "python/src/loop_asks.h"
 #include "transports/ros2/ros2_transport.h"
 
 namespace lapservo::python {
@@ -122,7 +123,11 @@ is sent.)")
            py::keep_alive<1, 5>(),
            "arm: its namespace, 'PSM1'; rig: with the arm's joints; controller: whose limits no setpoint exceeds, of "
            "joint_limits; enable_motion: else nothing is sent; setpoint_readers: nodes that may read servo_jp, the "
-           "arm's and others; wait_s: for the arm's joints, without which InputError is raised.");
+           "arm's and others; wait_s: for the arm's joints, without which InputError is raised.")
+      .def(
+          "state", [](Ros2Robot& self) { return unlocked([&] { return loop_asks ? self.state() : self.latest(); }); },
+          "JointState as it is now, in any thread. A short fault is reported to run() alone, also through the state() "
+          "of a Robot that passes this one's on.");
   py::class_<Ros2Camera, ImageStream>(m, "Ros2Camera", "The newest image of a topic of ROS 2.")
       .def(py::init([](const std::string& topic, const Rig& rig, const SteadyClock& clock) {
              return std::make_unique<Ros2Camera>(topic, rig.camera, clock);

@@ -20,6 +20,7 @@
 #include "python/src/bindings.h"
 #include "python/src/controller.h"
 #include "python/src/conversions.h"
+#include "python/src/loop_asks.h"
 #include "python/src/observed.h"
 #include "python/src/python_frames.h"
 
@@ -46,7 +47,13 @@ py::sequence sequence_of(const py::object& given, std::size_t size, const char* 
 // The ports, implemented in Python.
 class PythonRobot : public Robot {
  public:
-  JointState state() override { PYBIND11_OVERRIDE_PURE(JointState, Robot, state); }
+  JointState state() override {
+    const struct Asking {
+      bool before = std::exchange(loop_asks, true);
+      ~Asking() { loop_asks = before; }
+    } asking;
+    PYBIND11_OVERRIDE_PURE(JointState, Robot, state);
+  }
   std::vector<JointReading> readings() override {
     const py::gil_scoped_acquire mine;
     const py::function method = py::get_override(static_cast<const Robot*>(this), "readings");

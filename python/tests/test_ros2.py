@@ -5,6 +5,7 @@ import re
 import shlex
 import subprocess
 import sys
+import time
 
 import numpy as np
 import pytest
@@ -78,6 +79,26 @@ def test_without_motion_enabled_nothing_is_sent_and_a_goal_that_can_not_be_reach
                  on_tick=ticks.append)
     assert any(tick.image is not None for tick in ticks) and robot.state().operating_state == "ENABLED"
     assert np.abs(robot.state().q - before.q).max() < 1e-3
+
+
+def test_an_onlooker_takes_nothing_from_the_loop(theatre, rig):
+    robot = lapservo.Ros2Robot("SIM_PSM1", rig, lapservo.Controller(rig), lapservo.SteadyClock())
+
+    class HandedOn(lapservo.Robot):
+        def state(self):
+            return robot.state()
+
+    def wait_for(read, blocked, meanwhile=lambda: None):
+        while read().blocked != blocked:
+            meanwhile()
+            time.sleep(0.01)
+
+    loop = HandedOn()
+    wait_for(lambda: lapservo.Robot.state(loop), "none")
+    other = lapservo.Ros2Arm("SIM_PSM1", rig.instruments[0].joints.names)
+    wait_for(robot.state, "second_source", lambda: other.publish(np.zeros(4), np.zeros(4)))
+    wait_for(robot.state, "none")
+    assert lapservo.Robot.state(loop).blocked == "second_source"
 
 
 def test_the_wrist_of_the_rigs_tool_is_read(theatre, rig):
