@@ -6,7 +6,9 @@
 
 #include "lapservo/core/error.h"
 #include "lapservo/crtk/crtk_robot.h"
+#include "lapservo/crtk/interlock.h"
 #include "lapservo/crtk/joint_map.h"
+#include "lapservo/robot/operating_state.h"
 
 namespace lapservo::internal {
 
@@ -29,10 +31,11 @@ void CrtkArm::take(JointMessage&& message) {
   const bool is_whole = message.positions.size() == names_.size() &&
                         (message.names.empty() || message.names == names_) && all_finite(message.positions);
   const std::lock_guard lock(mutex_);
-  if (is_whole) {
-    setpoint_ = std::move(message.positions);
-  } else {
+  if (!is_whole) {
     ++malformed_;
+  } else if (obeys_) {
+    setpoint_ = std::move(message.positions);
+    arrival_s_ = transport_.stamp_now_s();
   }
 }
 
@@ -50,6 +53,11 @@ void CrtkArm::say_joints(const JointMessage& measured, const JointMessage& setpo
 
 void CrtkArm::say_state(OperatingStateMessage state) {
   constexpr double period_s = 0.5;
+  {
+    const std::lock_guard lock(mutex_);
+    obeys_ = state.state == to_string(OperatingState::enabled) && state.is_homed && !state.is_busy;
+    if (!obeys_) setpoint_.reset();
+  }
   state.stamp_s = transport_.stamp_now_s();
   if (said_ && state.state == said_->state && state.is_homed == said_->is_homed && state.is_busy == said_->is_busy &&
       std::abs(state.stamp_s - said_->stamp_s) < period_s)
@@ -60,6 +68,7 @@ void CrtkArm::say_state(OperatingStateMessage state) {
 
 std::optional<std::vector<double>> CrtkArm::new_setpoint() {
   const std::lock_guard lock(mutex_);
+  if (std::abs(transport_.stamp_now_s() - arrival_s_) > lost_s) setpoint_.reset();
   return std::exchange(setpoint_, std::nullopt);
 }
 

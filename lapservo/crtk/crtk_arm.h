@@ -23,7 +23,8 @@ class CrtkArm {
   /// Publishes a state that has changed, and every 0.5 s the same one. The stamp is set here.
   void say_state(OperatingStateMessage state);
 
-  /// The newest setpoint of servo_jp since the last call, of all joints, finite.
+  /// The newest setpoint of servo_jp since the last call, of all joints, finite. None that came before the arm was
+  /// ENABLED, homed and not busy by say_state(), or longer ago than the loop waits for it (lost_s).
   std::optional<std::vector<double>> new_setpoint();
   /// Words of state_command since the last call: enable, disable, pause, resume, home, unhome.
   std::vector<std::string> new_commands();
@@ -41,6 +42,8 @@ class CrtkArm {
 
   mutable std::mutex mutex_;  // of what the transport's threads touch
   std::optional<std::vector<double>> setpoint_;
+  double arrival_s_ = 0;  // of it
+  bool obeys_ = true;     // by the state that was said last
   std::vector<std::string> commands_;
   long malformed_ = 0;
   std::vector<Transport::Subscription> subscriptions_;  // last: they use the others

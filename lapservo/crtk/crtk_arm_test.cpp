@@ -31,6 +31,25 @@ TEST(CrtkArm, GivesTheNewestSetpointOnceAndDropsWhatIsNotOfItsJoints) {
   EXPECT_EQ(arm.malformed(), 3);
 }
 
+// By then the arm may be elsewhere; a hiccup of 0.3 s must not lose where the loop has braked it.
+TEST(CrtkArm, ASetpointIsVoidOnceTheLoopHasGivenItUpOrTheArmDidNotObey) {
+  TestTransport transport;
+  CrtkArm arm(transport, "A", {"a"});
+  const auto remains = [&](double after_s, const std::vector<OperatingStateMessage>& states) {
+    transport.say("/A/servo_jp", JointMessage{1, {"a"}, {1}});
+    for (const OperatingStateMessage& state : states) arm.say_state(state);
+    transport.stamp_s += after_s;
+    return arm.new_setpoint().has_value();
+  };
+  const OperatingStateMessage enabled{0, "ENABLED", true, false};
+  EXPECT_TRUE(remains(0.3, {enabled}));
+  EXPECT_FALSE(remains(0.8, {enabled}));
+  EXPECT_FALSE(remains(0, {{0, "PAUSED", true, false}, enabled}));
+  EXPECT_FALSE(remains(0, {{0, "ENABLED", true, true}}));
+  EXPECT_FALSE(remains(0, {enabled}));  // came while it was busy
+  EXPECT_TRUE(remains(0, {}));
+}
+
 TEST(CrtkArm, KeepsEveryCommandInItsOrder) {
   TestTransport transport;
   CrtkArm arm(transport, "A", {"a"});

@@ -375,7 +375,6 @@ void Interlock::give_up(Blocked why, double now_s) {
 
 // After a pause the arm may not have what was sent last: from where it is, the next setpoint would be a step.
 bool Interlock::is_lost_on_its_way(double now_s) {
-  constexpr double lost_s = 0.7;
   if (phase_ != Phase::idle || !continues_ || lies_between(setpoint_->q, last_, last_)) return false;
   if (now_s - sent_.back().time_s > lost_s) give_up(Blocked::displaced, now_s);
   return true;

@@ -23,6 +23,9 @@
 
 namespace lapservo::internal {
 
+/// So long after its last setpoint an arm that is not there is given up as displaced.
+inline constexpr double lost_s = 0.7;
+
 struct InterlockConfig {
   Joints joints;
   JointLimits limits;           ///< of q: positions and rates that no setpoint exceeds

@@ -157,8 +157,10 @@ void bind_arm_side(py::module_& m) {
           "measured_js, setpoint_js and operating_state, 100 times a second or more. measured, setpoint: of all "
           "joints, rad and m, where they are and where the robot was last sent; operating_state: DISABLED, ENABLED, "
           "PAUSED or FAULT; is_busy: it moves by itself.")
-      .def("new_setpoint", &Ros2Arm::new_setpoint,
-           "The newest setpoint of all joints, rad and m, since the last call, or None. The robot goes there at once.")
+      .def(
+          "new_setpoint", &Ros2Arm::new_setpoint,
+          "The newest setpoint of all joints, rad and m, since the last call, or None. The robot goes there at once. A "
+          "setpoint expires after 0.7 s, and unless publish() said ENABLED, homed and not busy when it came.")
       .def("new_commands", &Ros2Arm::new_commands,
            "Words of state_command since the last call: enable, disable, pause, resume, home, unhome.")
       .def_property_readonly("malformed", &Ros2Arm::malformed,
