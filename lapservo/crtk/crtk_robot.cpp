@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstdio>
 #include <map>
+#include <string_view>
 #include <utility>
 
 #include <fmt/format.h>
@@ -63,6 +64,12 @@ std::string pid_of(const std::string& arm) {
 
 std::string topic_of(const std::string& arm, const std::string& name) {
   return (arm.rfind('/', 0) == 0 ? "" : "/") + arm + "/" + name;
+}
+
+std::string instrument_of(const std::string& arm) {
+  constexpr std::string_view simulated = "SIM_";
+  const std::string name = arm.substr(arm.rfind('/') + 1);
+  return name.starts_with(simulated) ? name.substr(simulated.size()) : name;
 }
 
 CrtkRobot::CrtkRobot(Transport& transport, const std::string& arm, const InterlockConfig& config, const Clock& clock)

@@ -61,4 +61,7 @@ class CrtkRobot : public Robot {
 /// "/PSM1/measured_js" of "PSM1" or "/PSM1" and "measured_js".
 std::string topic_of(const std::string& arm, const std::string& name);
 
+/// "PSM1", as the rig calls its instrument, of "/dvrk/PSM1" and of the simulated arm "SIM_PSM1".
+std::string instrument_of(const std::string& arm);
+
 }  // namespace lapservo::internal

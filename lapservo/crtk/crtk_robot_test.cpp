@@ -90,6 +90,11 @@ TEST(CrtkRobot, SaysOnceWhoReadsBesideTheArm) {
             "lapservo: /PSM1/servo_jp is read by /arm, /recorder, expected 1\n");
 }
 
+TEST(CrtkRobot, AnArmsInstrumentHasTheLastPartOfItsName) {
+  for (const char* arm : {"PSM1", "/PSM1", "dvrk/PSM1", "SIM_PSM1", "/dvrk/SIM_PSM1"})
+    EXPECT_EQ(instrument_of(arm), "PSM1") << arm;
+}
+
 TEST(OperatorPresence, IsAButtonThatIsPressedThroughoutAndSaysSo) {
   TestTransport transport;
   StandingClock clock;

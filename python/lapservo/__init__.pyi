@@ -347,6 +347,7 @@ class Ros2Robot(Robot):
         enable_motion: bool = ...,
         setpoint_readers: int = ...,
         wait_s: float = ...,
+        instrument: Optional[str] = ...,
     ) -> None: ...
     def state(self) -> JointState: ...
 

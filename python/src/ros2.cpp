@@ -33,10 +33,10 @@ struct Node {
   Ros2Transport transport;
 };
 
-class Ros2Robot : private Node, public CrtkRobot {
+class Ros2Robot : private Node, public CrtkRobot, public ArmOf {
  public:
-  Ros2Robot(const std::string& arm, const InterlockConfig& interlock, const Clock& clock)
-      : CrtkRobot(transport, arm, interlock, clock) {}
+  Ros2Robot(const std::string& arm, const std::string& instrument, const InterlockConfig& interlock, const Clock& clock)
+      : CrtkRobot(transport, arm, interlock, clock), ArmOf{instrument} {}
 };
 
 class Ros2Camera : private Node, public ImageStream {
@@ -103,12 +103,16 @@ void wait_for_joints(Ros2Robot& robot, const std::string& arm, double wait_s) {
 
 std::unique_ptr<Ros2Robot> make_robot(const std::string& arm, const Rig& rig, const Controller& controller,
                                       const SteadyClock& clock, bool enable_motion, std::size_t setpoint_readers,
-                                      double wait_s) {
-  const Instrument& instrument = rig.instruments.front();
+                                      double wait_s, const std::optional<std::string>& name) {
+  const Instrument& instrument = rig.instruments.front();  // run() steers it; another arm's would move the wrong joints
+  if (const std::string wanted = name.value_or(instrument_of(arm)); instrument.name != wanted)
+    throw InputError(
+        "Ros2Robot", "rig.instruments[0]", instrument.name,
+        fmt::format("{}, or instrument='{}' where that is the arm's name in the rig", wanted, instrument.name));
   if (!instrument.joints)
     throw InputError("Ros2Robot", "rig", "without joints", "the arm's joints: names, sign, offset");
   auto robot = std::make_unique<Ros2Robot>(
-      arm, interlock_of(instrument, controller.limits, enable_motion, setpoint_readers), clock);
+      arm, instrument.name, interlock_of(instrument, controller.limits, enable_motion, setpoint_readers), clock);
   wait_for_joints(*robot, arm, wait_s);
   return robot;
 }
@@ -120,9 +124,10 @@ ROS need not be installed. A thread of its own samples the last path 500 times a
 is sent.)")
       .def(py::init(&make_robot), py::arg("arm"), py::arg("rig"), py::arg("controller"), py::arg("clock"),
            py::kw_only(), py::arg("enable_motion") = false, py::arg("setpoint_readers") = 1, py::arg("wait_s") = 15.0,
-           py::keep_alive<1, 5>(),
-           "arm: its namespace, 'PSM1'; rig: with the arm's joints; controller: whose limits no setpoint exceeds, of "
-           "joint_limits; enable_motion: else nothing is sent; setpoint_readers: nodes that may read servo_jp, the "
+           py::arg("instrument") = py::none(), py::keep_alive<1, 5>(),
+           "arm: its namespace, 'PSM1'; rig: with the arm's joints, whose first instrument has the arm's name, or that "
+           "of `instrument`; controller: whose limits no setpoint exceeds, of joint_limits; enable_motion: else "
+           "nothing is sent; setpoint_readers: nodes that may read servo_jp, the "
            "arm's and others; wait_s: for the arm's joints, without which InputError is raised.")
       .def(
           "state", [](Ros2Robot& self) { return unlocked([&] { return loop_asks ? self.state() : self.latest(); }); },

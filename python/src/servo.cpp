@@ -356,6 +356,10 @@ void bind_tick(py::module_& m) {
 void run_loop(Robot& robot, ImageStream& images, Clock& clock, const std::shared_ptr<Rig>& rig,
               const Trajectory& trajectory, double duration_s, const std::optional<Controller>& controller,
               const std::optional<Array<"rcm_px", 2>>& rcm_px, bool own_thread, py::object on_tick) {
+  const auto* arm = dynamic_cast<const ArmOf*>(&robot);
+  if (arm && arm->instrument != rig->instruments.front().name)
+    throw InputError("run", "rig.instruments[0]", rig->instruments.front().name,
+                     arm->instrument + ", which the robot moves");
   RunConfig config;
   config.rig = *rig;
   const Controller used =

@@ -101,6 +101,17 @@ def test_an_onlooker_takes_nothing_from_the_loop(theatre, rig):
     assert lapservo.Robot.state(loop).blocked == "second_source"
 
 
+def test_an_arm_is_moved_by_its_own_entry_of_the_rig_only(theatre, rig):
+    clock, controller, marker = lapservo.SteadyClock(), lapservo.Controller(rig), rig.instruments[0].marker
+    both = lapservo.Rig(rig.camera, [lapservo.Instrument("PSM2", marker, joints=rig.instruments[0].joints), *rig.instruments])
+    with pytest.raises(lapservo.InputError, match="is PSM2, expected PSM1, or"):
+        lapservo.Ros2Robot("/dvrk/SIM_PSM1", both, controller, clock)
+    robot = lapservo.Ros2Robot("SIM_PSM1", rig, controller, clock)
+    images = lapservo.Ros2Camera("/endoscope/image_raw", rig, clock)
+    with pytest.raises(lapservo.InputError, match="is PSM2, expected PSM1, which the robot moves"):
+        lapservo.run(robot, images, clock, both, lapservo.paper_trajectory(), 1)
+
+
 def test_the_wrist_of_the_rigs_tool_is_read(theatre, rig):
     joint = ("    tool: {joints: [{name: wrist_pitch, alpha_rad: -1.57}], tip_in_last_joint_m: [0.01, 0, 0], "
              "wrist_in_marker_m: [0, 0, 0.03], azimuth_rad: 0}\n")
@@ -114,7 +125,7 @@ def test_what_is_not_there_is_said(theatre, rig):
     clock = lapservo.SteadyClock()
     controller = lapservo.Controller(rig)
     with pytest.raises(lapservo.InputError, match="no /PSM9/measured_js with the rig's joints within 0.3 s"):
-        lapservo.Ros2Robot("PSM9", rig, controller, clock, wait_s=0.3)
+        lapservo.Ros2Robot("PSM9", rig, controller, clock, wait_s=0.3, instrument="PSM1")
     bare = lapservo.Rig(rig.camera, [lapservo.Instrument("PSM1", rig.instruments[0].marker)])
     with pytest.raises(lapservo.InputError, match="joints"):
         lapservo.Ros2Robot("SIM_PSM1", bare, controller, clock)

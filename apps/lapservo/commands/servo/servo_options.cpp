@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <utility>
 
 #include <Eigen/Core>
@@ -14,6 +13,7 @@
 #include "lapservo/core/csv.h"
 #include "lapservo/core/error.h"
 #include "lapservo/crtk/arm_limits.h"
+#include "lapservo/crtk/crtk_robot.h"
 #include "lapservo/crtk/joint_map.h"
 #include "lapservo/experiments/setup.h"
 #include "lapservo/kinematics/centre_line.h"
@@ -57,13 +57,10 @@ std::string names_of(const Rig& rig) {
   return names;
 }
 
-// PSM1 of ros2:/dvrk/PSM1, and of the simulated arm SIM_PSM1; empty without an arm.
+// PSM1 of ros2:/dvrk/PSM1; empty without an arm.
 std::string arm_name(const std::string& robot) {
-  constexpr std::string_view simulated = "SIM_";
   const std::size_t colon = robot.find(':');
-  if (colon == std::string::npos) return {};
-  const std::string name = robot.substr(robot.find_last_of(":/") + 1);
-  return name.rfind(simulated, 0) == 0 ? name.substr(simulated.size()) : name;
+  return colon == std::string::npos ? std::string() : instrument_of(robot.substr(colon + 1));
 }
 
 // That of --instrument, else that of the arm's name, else the first. Another arm's rig would move the wrong joints.
