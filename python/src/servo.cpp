@@ -1,5 +1,6 @@
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <pybind11/functional.h>
 #include <string>
 #include <utility>
@@ -15,6 +16,7 @@
 #include "lapservo/robot/robot.h"
 #include "lapservo/robot/steady_clock.h"
 #include "lapservo/servo/controller_file.h"
+#include "lapservo/servo/image_features.h"
 #include "lapservo/servo/image_window.h"
 #include "lapservo/servo/run.h"
 #include "python/src/bindings.h"
@@ -366,10 +368,18 @@ void run_loop(Robot& robot, ImageStream& images, Clock& clock, const std::shared
       controller ? *controller : make_controller(*rig, "fused", {}, ControllerConfig{}.period_s, {}, {}, 20, {});
   config.controller = used;
   if (used.has_joint_limits) config.arm_limits = used.limits;
-  if (rcm_px) config.rcm_px = rcm_px->value;
+  if (used.mode == ControlMode::uncalibrated) {
+    config.rcm_px = rcm_px ? std::optional(rcm_px->value) : rcm_image_px(config.rig, {});
+    if (!config.rcm_px)
+      throw InputError("run", "rcm_px", "None",
+                       "the RCM's image, of a rig without camera_from_rcm: see estimate_rcm()");
+    config.rig.instruments.front().camera_from_rcm.reset();
+  } else if (rcm_px) {
+    throw InputError("run", "rcm_px", "given", "None, or a controller of mode 'uncalibrated'");
+  }
   config.tracking_thread = own_thread ? TrackingThread::own : TrackingThread::callers;
   if (config.controller.mode == ControlMode::paper) config.tracker.method = Method::centerline;
-  PythonObserver observer(std::move(on_tick), rig);
+  PythonObserver observer(std::move(on_tick), std::make_shared<const Rig>(config.rig));
   const py::gil_scoped_release others_run;
   run(robot, images, clock, config, trajectory, duration_s, observer);
 }
@@ -404,6 +414,8 @@ It holds by itself, within the tick, on a missing or stale image, a lost marker,
 finite, and goes on when all is well again within 2 s. After anything else, above all an arm that was not enabled, it
 holds until JointState.started; this call is the first start, and counts when the arm has been ready for 0.5 s.
 Where Robot.is_simulated() is False, the controller needs joint_limits.
+rcm_px: float[2], the RCM's image in ideal pixels, for mode 'uncalibrated' only, which uses no camera_from_rcm but for
+the default of rcm_px.
 own_thread: vision in a thread of its own, so that setpoints never wait for it (for real arms). on_tick(ControlTick) may
 return False, which ends the run. However it ends, the arm brakes to rest.
 

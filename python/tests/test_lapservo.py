@@ -261,6 +261,18 @@ def test_a_goal_that_can_not_be_reached_is_refused(rig):
         assert arm.sent == 0 and np.array_equal(simulator.state().q, lapservo.Simulator(rig, Q).state().q)
 
 
+def test_the_uncalibrated_loop_goes_by_rcm_px_alone_and_no_other_takes_it(rig):
+    simulator, seen = lapservo.Simulator(rig, Q), []
+    uncalibrated = lapservo.Controller(rig, mode="uncalibrated")
+    goal = lapservo.set_point(lapservo.Kinematics(rig).features(Q))
+    lapservo.run(simulator, simulator, simulator, rig, goal, 0.5, controller=uncalibrated, rcm_px=[640, -600],
+                 on_tick=lambda tick: seen.extend(tick.observations))
+    assert any(each.ok for each in seen) and all(each.q is None for each in seen)
+    for of, given in ((rig, {"rcm_px": [640, -600]}), (free(rig), {"controller": uncalibrated})):
+        with pytest.raises(lapservo.InputError, match="run: rcm_px"):
+            lapservo.run(simulator, simulator, simulator, of, goal, 1, **given)
+
+
 def test_clocks_that_are_not_the_loops_are_refused(rig):
     class Ahead(Arm):
         def state(self):
