@@ -1,6 +1,8 @@
 #include "python/src/python_frames.h"
 
 #include <cmath>
+#include <mutex>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -73,6 +75,39 @@ class IteratedFrames : public FrameSource {
   int index_ = 0;
 };
 
+// For threads that share it; called without Python's lock, which others hold while they wait for this one.
+class SharedFrames : public FrameSource {
+ public:
+  explicit SharedFrames(std::unique_ptr<FrameSource> source) : source_(std::move(source)) {}
+
+  std::optional<Frame> next() override {
+    const std::lock_guard lock(mutex_);
+    return source_->next();
+  }
+  std::string complaint() const override {
+    const std::lock_guard lock(mutex_);
+    return source_->complaint();
+  }
+  Kind kind() const override { return source_->kind(); }
+  std::optional<int> frame_count() const override { return source_->frame_count(); }
+  double frames_per_second() const override { return source_->frames_per_second(); }
+  std::optional<double> first_stamp_s() const override { return source_->first_stamp_s(); }
+  std::string remark() const override { return source_->remark(); }
+  bool is_srgb() const override { return source_->is_srgb(); }
+  bool is_lossy() const override { return source_->is_lossy(); }
+
+ private:
+  mutable std::mutex mutex_;
+  std::unique_ptr<FrameSource> source_;
+};
+
+// Ctrl-C ends the wait for an image as an exception of Python's.
+bool is_interrupted() {
+  const py::gil_scoped_acquire mine;
+  if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+  return false;
+}
+
 void check_rate(double fps) {
   if (!(fps >= 0.001 && fps <= 1000))
     throw InputError("fps", "number", fmt::format("{}", fps), "0.001 to 1000 frames per second");
@@ -83,9 +118,10 @@ void check_rate(double fps) {
 std::unique_ptr<FrameSource> open_path(const std::string& path, double fps, const VideoReading& reading,
                                        const std::string& image_topic) {
   check_rate(fps);
-  if (internal::is_bag(path)) return std::make_unique<internal::BagFrames>(internal::open_bag(path), image_topic);
+  if (internal::is_bag(path))
+    return std::make_unique<SharedFrames>(std::make_unique<internal::BagFrames>(internal::open_bag(path), image_topic));
   if (!image_topic.empty()) throw InputError("image_topic", "name", image_topic, "'' for what is no bag, as " + path);
-  return internal::open_camera_or_file(path, fps, {}, nullptr, reading);
+  return std::make_unique<SharedFrames>(internal::open_camera_or_file(path, fps, {}, is_interrupted, reading));
 }
 
 bool is_path(const py::object& given) {

@@ -9,7 +9,8 @@
 
 namespace lapservo::python {
 
-/// The frames of an image, a folder, a video, a bag or a camera. `image_topic`: of a bag with several. Throws
+/// The frames of an image, a folder, a video, a bag or a camera, which threads may share; next() and complaint() wait
+/// without Python's lock. `image_topic`: of a bag with several. Throws
 /// InputError as internal::open_camera_or_file() and internal::BagFrames, and for `fps` beyond 0.001 to 1000.
 std::unique_ptr<FrameSource> open_path(const std::string& path, double fps, const VideoReading& reading = {},
                                        const std::string& image_topic = {});

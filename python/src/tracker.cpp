@@ -266,11 +266,12 @@ void bind_frames(py::module_& m) {
       .def_property_readonly("frames_per_second", &FrameSource::frames_per_second)
       .def_property_readonly("remark", &FrameSource::remark,
                              "how it is read where the file does not say, and the option that decides, or ''")
-      .def_property_readonly("complaint", &FrameSource::complaint,
-                             "after the end: what is wrong with the file as a whole, or ''")
+      .def_property_readonly(
+          "complaint", [](const FrameSource& source) { return unlocked([&] { return source.complaint(); }); },
+          "after the end: what is wrong with the file as a whole, or ''")
       .def("__iter__", [](FrameSource& source) -> FrameSource& { return source; })
-      .def("__next__", [](FrameSource& source) {  // with Python's lock: threads may share the source
-        auto frame = source.next();
+      .def("__next__", [](FrameSource& source) {
+        auto frame = unlocked([&] { return source.next(); });
         if (!frame) throw py::stop_iteration();
         return *frame;
       });
@@ -278,7 +279,9 @@ void bind_frames(py::module_& m) {
       "open_frames",
       [](const std::filesystem::path& input, double fps, bool deinterlaced, const std::string& colour_matrix,
          const std::string& chroma_location, const std::string& image_topic) {
-        return open_path(input.string(), fps, {deinterlaced, colour_matrix, chroma_location}, image_topic);
+        return unlocked([&] {
+          return open_path(input.string(), fps, {deinterlaced, colour_matrix, chroma_location}, image_topic);
+        });
       },
       py::arg("input"), py::arg("fps") = 30.0, py::arg("deinterlaced") = false, py::arg("colour_matrix") = "",
       py::arg("chroma_location") = "", py::arg("image_topic") = "",

@@ -1,6 +1,8 @@
 import pickle
 import re
+import signal
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -71,6 +73,34 @@ def test_cameras_give_frames():
     assert source.complaint == ""
     with pytest.raises(lapservo.InputError, match="/dev/video-none: gives no images"):
         lapservo.open_frames("/dev/video-none")
+
+
+def test_who_waits_for_a_camera_lets_others_run_and_hears_signals():
+    try:
+        source = lapservo.open_frames("gst:videotestsrc is-live=true ! video/x-raw,width=64,height=48,framerate=2/1")
+    except lapservo.InputError as error:
+        pytest.skip(str(error))  # built without GStreamer
+    turns, waiting = 0, threading.Thread(target=lambda: [next(source) for _ in range(5)])
+    waiting.start()
+    while waiting.is_alive():
+        time.sleep(0.001)
+        turns += 1
+    assert turns > 100
+
+    def interrupt(*_):
+        raise TimeoutError
+
+    before = signal.signal(signal.SIGALRM, interrupt)
+    try:
+        slow = lapservo.open_frames("gst:videotestsrc is-live=true ! video/x-raw,width=64,height=48,framerate=1/4")
+        next(slow)
+        signal.setitimer(signal.ITIMER_REAL, 0.3)
+        begin_s = time.monotonic()
+        with pytest.raises(TimeoutError):
+            list(slow)
+        assert time.monotonic() - begin_s < 2
+    finally:
+        signal.signal(signal.SIGALRM, before)
 
 
 def test_an_overlay_is_a_new_picture(rig, image):
