@@ -247,6 +247,7 @@ PrintColour print_colour(double hue_deg) {
 
 void write_print_sheet(const std::filesystem::path& path, const std::string& instrument, const Marker& marker,
                        Paper paper, int copies) {
+  if (copies < 1) throw InputError(path.string(), "copies", fmt::format("{}", copies), "1 or more");
   const double page_width = paper == Paper::a4 ? 210 : 215.9, page_height = paper == Paper::a4 ? 297 : 279.4;
   const double length = length_mm(marker), width = width_mm(marker);
   const double left = 25, top = 78, room = page_width - left - edge_mm;

@@ -252,6 +252,15 @@ TEST(PrintSheet, HoldsTheCopiesThatFitBesideOneAnother) {
     });
 }
 
+TEST(PrintSheet, OfNoCopiesIsRefused) {
+  const TemporaryFolder folder;
+  for (const int copies : {0, -1})
+    EXPECT_NE(testing::input_error([&] {
+                write_print_sheet(folder / "sheet.svg", "PSM1", example, Paper::a4, copies);
+              }).find("copies"),
+              std::string::npos);
+}
+
 // Where letters begin on an SVG page.
 std::vector<Vector2d> letters(const std::string& svg) {
   std::vector<Vector2d> found;

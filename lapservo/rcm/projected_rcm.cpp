@@ -12,6 +12,7 @@
 
 #include "lapservo/core/dense_matrix.h"
 #include "lapservo/core/departures.h"
+#include "lapservo/core/error.h"
 #include "lapservo/core/random.h"
 #include "lapservo/core/words.h"
 
@@ -311,6 +312,8 @@ std::string_view to_string(RcmStatus status) {
 }
 
 RcmEstimate estimate_projected_rcm(std::span<const LineObservation> given, const RcmOptions& options) {
+  if (!(options.common_px >= 0) || !std::isfinite(options.common_px))
+    throw InputError("estimate_rcm", "common_px", fmt::format("{}", options.common_px), "0 or more pixels");
   RcmEstimate estimate;
   estimate.used.assign(given.size(), false);
   Lines lines;

@@ -22,7 +22,8 @@ enum class NoiseScale {
 struct RcmOptions {
   NoiseScale scale = NoiseScale::estimated;
   /// One sigma of an error that all lines share: of their from ends together, and of their to ends, across the lines.
-  /// It does not average out and does not show in how well the lines meet (the light, the lens, the print).
+  /// It does not average out and does not show in how well the lines meet (the light, the lens, the print). Finite and
+  /// not negative, else the estimate is refused by an InputError.
   double common_px = 0;
 };
 

@@ -10,6 +10,7 @@
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
+#include "lapservo/core/error.h"
 #include "lapservo/rcm/pairwise_mean.h"
 #include "lapservo/rcm/test_lines.h"
 
@@ -164,6 +165,11 @@ TEST(ProjectedRcm, CovarianceCoversWhatTheLinesShare) {
                                   *estimate_projected_rcm(lines, {NoiseScale::known}).covariance_px2;
     EXPECT_LT((added - expected).norm(), 1e-3 * expected.norm()) << "trial " << trial;
   }
+}
+
+TEST(ProjectedRcm, ACommonErrorThatIsNoneIsRefused) {
+  for (const double common_px : {-5.0, std::nan(""), double{INFINITY}})
+    EXPECT_THROW((void)estimate_projected_rcm({}, {NoiseScale::estimated, common_px}), InputError) << common_px;
 }
 
 // A fan so narrow, and noise so large, that lines weighted where they seem to be pull the estimate towards themselves.

@@ -5,6 +5,7 @@
 #include <Eigen/Cholesky>
 #include <gtest/gtest.h>
 
+#include "lapservo/core/error.h"
 #include "lapservo/geometry/invertible.h"
 #include "lapservo/kinematics/centre_line.h"
 #include "lapservo/kinematics/feature_map.h"
@@ -103,6 +104,12 @@ TEST(ImageFeatures, TheWindowLiesInThePicture) {
         EXPECT_LE(raw.y(), camera.height_px - 1 - 19.9) << k1;
       }
   }
+}
+
+TEST(ImageFeatures, AMarginThatIsNoneIsRefused) {
+  const Camera camera = testing::paper_test_rig().camera;
+  for (const double margin_px : {-1.0, 360.0, double{NAN}, double{INFINITY}})
+    EXPECT_THROW((void)image_window(camera, margin_px), InputError) << margin_px;
 }
 
 TEST(ImageFeatures, TheWindowLeavesOutCornersThatTheLensFolds) {

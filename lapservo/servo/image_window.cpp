@@ -33,6 +33,11 @@ void leave_out_fold(const Camera& camera, ImageWindow& window) {
 
 ImageWindow image_window(const Camera& camera, double margin_px) {
   constexpr int steps = 64;
+  const auto expect = [&](bool leaves_some) {
+    if (!leaves_some)
+      throw InputError("controller", "margin_px", std::to_string(margin_px), "a margin that leaves some of the image");
+  };
+  expect(margin_px >= 0 && 2 * margin_px < std::min(camera.width_px, camera.height_px));  // else NaN passes by min, max
   const double right = camera.width_px - 1 - margin_px, bottom = camera.height_px - 1 - margin_px;
   const auto narrow = [&](double& bound, double u, double v, int axis, bool is_low) {
     if (const auto px = camera.ideal_from_raw({u, v}))
@@ -47,8 +52,7 @@ ImageWindow image_window(const Camera& camera, double margin_px) {
     narrow(window.v_max_px, u, bottom, 1, false);
   }
   leave_out_fold(camera, window);
-  if (!(window.u_max_px > window.u_min_px && window.v_max_px > window.v_min_px))
-    throw InputError("controller", "margin_px", std::to_string(margin_px), "a margin that leaves some of the image");
+  expect(window.u_max_px > window.u_min_px && window.v_max_px > window.v_min_px);
   return window;
 }
 

@@ -391,7 +391,7 @@ class Controller:
         rig: Rig,
         *,
         mode: str = ...,
-        path: Optional[str] = ...,
+        path: Optional[_Path] = ...,
         period_s: float = ...,
         gains_per_s: Optional[ArrayLike] = ...,
         delay_s: Optional[float] = ...,

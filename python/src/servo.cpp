@@ -248,7 +248,7 @@ JointLimits joint_limits_of(const py::object& given, const Rig& rig) {
   return {row(0), row(1), row(2), row(3)};
 }
 
-Controller make_controller(const Rig& rig, const std::string& mode, const std::optional<std::string>& path,
+Controller make_controller(const Rig& rig, const std::string& mode, const std::optional<std::filesystem::path>& path,
                            double period_s, const std::optional<Array<"gains_per_s", 4>>& gains_per_s,
                            const std::optional<double>& delay_s, double window_margin_px,
                            const std::optional<py::object>& joint_limits) {

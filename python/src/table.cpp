@@ -1,6 +1,8 @@
 #include <filesystem>
+#include <optional>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "lapservo/core/error.h"
@@ -33,23 +35,25 @@ py::dict dict_of(const Observed& seen) {
 // A context: what left it without an exception is a whole table.
 class Table {
  public:
-  explicit Table(const std::filesystem::path& path) : csv_(path) {}
+  explicit Table(const std::filesystem::path& path) : csv_(std::in_place, path) {}
 
   void add(const std::vector<Observed>& observations, const Frame* frame) {
+    if (!csv_) throw InputError("ObservationCsv.add", "is called after the end of the table's `with`");
     for (const Observed& seen : observations) {
       if (!frame && !seen.stamp_s)
         throw InputError("ObservationCsv.add", "stamp_s", "None", "a stamp given to track(), or the Frame");
-      csv_.add(frame ? frame->index : frames_, frame ? frame->time_s : *seen.stamp_s,
-               frame ? frame->file.filename().string() : "", seen.observation);
+      csv_->add(frame ? frame->index : frames_, frame ? frame->time_s : *seen.stamp_s,
+                frame ? frame->file.filename().string() : "", seen.observation);
     }
     ++frames_;
   }
   void leave(const py::object& exception) {
-    if (exception.is_none()) csv_.commit();
+    if (csv_ && exception.is_none()) csv_->commit();
+    csv_.reset();
   }
 
  private:
-  ObservationCsv csv_;
+  std::optional<ObservationCsv> csv_;  // until its end
   int frames_ = 0;
 };
 

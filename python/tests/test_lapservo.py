@@ -335,12 +335,14 @@ def test_trajectories(tmp_path):
         lapservo.load_trajectory(tmp_path / "none.csv")
 
 
-def test_a_controller_says_what_a_file_can(rig):
+def test_a_controller_says_what_a_file_can(rig, tmp_path):
     controller = lapservo.Controller(rig, mode="paper", period_s=1 / 30, delay_s=0.05)
     assert controller.mode == "paper" and "delay_s: 0.05" in controller.to_yaml()
     fused = lapservo.Controller(rig, mode="fused")
     assert fused.mode == "fused" and "mode: fused" in fused.to_yaml() and "fused" in repr(fused)
     assert lapservo.Controller(rig, mode="default").mode == "fused"
+    (tmp_path / "controller.yaml").write_text(fused.to_yaml())
+    assert lapservo.Controller(rig, path=tmp_path / "controller.yaml").to_yaml() == fused.to_yaml()
     with pytest.raises(lapservo.InputError) as caught:
         lapservo.Controller(rig, mode="fast")
     assert caught.value.field == "mode"

@@ -117,6 +117,8 @@ def test_a_table_of_arrays_takes_stamps_and_after_an_exception_there_is_none(rig
     with lapservo.ObservationCsv(tmp_path / "a.csv") as table:
         table.add(seen)
         table.add(seen)
+    with pytest.raises(lapservo.InputError, match="after the end"):
+        table.add(seen)
     rows = (tmp_path / "a.csv").read_text().splitlines()
     assert rows[1].startswith("0,0.250000,,PSM1,ok,") and rows[2].startswith("1,0.250000,,PSM1,ok,") and len(rows) == 3
     with pytest.raises(lapservo.InputError, match="stamp_s"), lapservo.ObservationCsv(tmp_path / "b.csv") as table:
