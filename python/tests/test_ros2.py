@@ -102,8 +102,10 @@ def test_an_onlooker_takes_nothing_from_the_loop(theatre, rig):
 
 
 def test_an_arm_is_moved_by_its_own_entry_of_the_rig_only(theatre, rig):
-    clock, controller, marker = lapservo.SteadyClock(), lapservo.Controller(rig), rig.instruments[0].marker
-    both = lapservo.Rig(rig.camera, [lapservo.Instrument("PSM2", marker, joints=rig.instruments[0].joints), *rig.instruments])
+    clock, controller, own = lapservo.SteadyClock(), lapservo.Controller(rig), rig.instruments[0]
+    marker = lapservo.Marker(diameter_m=0.008, bands_upper_m=own.marker.bands_upper_m, bands_lower_m=own.marker.bands_lower_m,
+                             hues_deg=[180, 270, 90])
+    both = lapservo.Rig(rig.camera, [lapservo.Instrument("PSM2", marker, joints=own.joints), own])
     with pytest.raises(lapservo.InputError, match="is PSM2, expected PSM1, or"):
         lapservo.Ros2Robot("/dvrk/SIM_PSM1", both, controller, clock)
     robot = lapservo.Ros2Robot("SIM_PSM1", rig, controller, clock)
