@@ -38,8 +38,8 @@ bool moved(const MarkerSighting& from, const MarkerSighting& to) {
 }
 
 // The last one is always the newest, so that what an endoscope does while the instrument rests leaves one sighting
-// only. Where there are many, half of them are enough to go on with.
-void add(std::vector<MarkerSighting>& sightings, const MarkerSighting& seen, std::size_t most) {
+// only. Where there are many, half of them are enough to go on with. Whether the instrument has moved.
+bool add(std::vector<MarkerSighting>& sightings, const MarkerSighting& seen, std::size_t most) {
   const std::size_t count = sightings.size();
   if (count >= 2 && !moved(sightings[count - 2], seen)) sightings.pop_back();
   if (sightings.size() == most) {
@@ -48,6 +48,7 @@ void add(std::vector<MarkerSighting>& sightings, const MarkerSighting& seen, std
     sightings.resize(kept);
   }
   sightings.push_back(seen);
+  return sightings.size() != count;
 }
 
 MarkerSighting sighting(const ImageMeasurement& image, const Measured& measured) {
@@ -92,9 +93,7 @@ void EndoscopeRecovery::see(const ServoInput& input, VisualController& controlle
 
 void EndoscopeRecovery::collect(const ImageMeasurement& image, VisualController& controller) {
   if (!image.camera_from_marker || !sees_from_start_) return;
-  const std::size_t before = seen_.size();
-  add(seen_, sighting(image, *measured_), max_compared);
-  if (seen_.size() != before) ++sightings_;
+  if (add(seen_, sighting(image, *measured_), max_compared)) ++sightings_;
   // The operator's motion may show which number it is.
   if (const auto why = wrong_rig(); why && why->cause == Explanation::Cause::rig && sightings_ >= explain_at_)
     blames_rig(controller, Blame::named);
@@ -202,7 +201,7 @@ void EndoscopeRecovery::follow(const ServoInput& input, const ControlStep& step,
   const auto seen = sighting_of(*input.image);
   if (!seen) return;
   if (wrong_rig()) return;
-  if (auto* waiting = std::get_if<WaitingForStart>(&state_)) return add(waiting->sightings, *seen, max_images);
+  if (auto* waiting = std::get_if<WaitingForStart>(&state_)) return void(add(waiting->sightings, *seen, max_images));
   wait_for_motion(std::get<WaitingForMotion>(state_), *seen, controller);
 }
 
@@ -255,9 +254,7 @@ std::optional<MarkerSighting> EndoscopeRecovery::sighting_of(const ImageMeasurem
 void EndoscopeRecovery::wait_for_motion(WaitingForMotion& waiting, const MarkerSighting& seen,
                                         VisualController& controller) {
   Sightings& sightings = waiting.sightings;
-  const std::size_t before = sightings.size();
-  add(sightings, seen, max_images);
-  if (sightings.size() == before || sightings.size() < waiting.fit_at) return;
+  if (!add(sightings, seen, max_images) || sightings.size() < waiting.fit_at) return;
   const auto found = fit(sightings);
   const bool contradicts = found && contradicts_itself(*found);
   if (found && !contradicts && is_certain(*found)) {

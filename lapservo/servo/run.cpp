@@ -95,18 +95,16 @@ struct FirstSight {
   double duration_s;
   bool saw_joints = false, saw_image = false;
 
-  void check(const ControlTick& tick, const Supervisor& arm) {
+  // `moving`: of an endoscope that may have moved meanwhile.
+  void check(const ControlTick& tick, const Supervisor& arm, const std::optional<MovingCamera>& moving) {
     if (tick.seen && !std::exchange(saw_image, true))
       refuse_other_clock("ImageStream", tick.seen->image.time_s, tick.input.time_s);
     const JointState& joints = tick.input.joints;
     // While it is held, others still bring it to where the loop will begin.
     if (!joints.q.vector().allFinite() || arm.held() || saw_joints) return;
-    auto camera_from_rcm = config.rig.instruments.at(0).camera_from_rcm;
-    if (config.endoscope && camera_from_rcm) {  // which may have moved meanwhile
-      const auto first_from_camera = config.endoscope->first_from_camera(tick.input.time_s);
-      if (!first_from_camera) return;
-      camera_from_rcm = first_from_camera->inverse() * *camera_from_rcm;
-    }
+    const auto camera_from_rcm =
+        moving ? moving->camera_from_rcm(tick.input.time_s) : config.rig.instruments.at(0).camera_from_rcm;
+    if (moving && !camera_from_rcm) return;
     saw_joints = true;
     refuse_other_clock("JointState", joints.time_s, tick.input.time_s);
     if (arm.is_simulated() && !joints.follows) return;
@@ -193,7 +191,7 @@ void run(Supervisor& arm, ImageStream& images, Clock& clock, const RunConfig& co
     if (moving) tips.use(moving->camera_from_rcm(tick.input.time_s));
     tick.input.desired = features.at(since_s);
     tick.pursues_tip = trajectory.tip_at(since_s).has_value();
-    first_sight.check(tick, arm);
+    first_sight.check(tick, arm, moving);
     if (tick.seen) tick.input.image = tick.seen->measurement;
     if (moving) {
       vision->set_delay(servo.controller().delay_s());

@@ -53,11 +53,7 @@ std::size_t index_of(const GivenRig& given, const std::optional<std::string>& na
 // Ctrl-C ends it as an exception of Python's.
 JobWatch watch_of(const py::object& progress) {
   JobWatch watch;
-  watch.is_stopped = [] {
-    const py::gil_scoped_acquire mine;
-    if (PyErr_CheckSignals() != 0) throw py::error_already_set();
-    return false;
-  };
+  watch.is_stopped = is_interrupted;
   if (!progress.is_none())
     watch.progress = [&progress](std::optional<int> total, int done, const std::string& remark) {
       const py::gil_scoped_acquire mine;

@@ -35,6 +35,13 @@ auto unlocked(Job job) {
   return job();
 }
 
+/// Ctrl-C ends a wait as an exception of Python's, in a thread that may have let others run; else false.
+inline bool is_interrupted() {
+  const py::gil_scoped_acquire mine;
+  if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+  return false;
+}
+
 /// An array that owns the image.
 Image array_of(const cv::Mat& bgr);
 

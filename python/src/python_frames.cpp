@@ -9,6 +9,7 @@
 #include "cameras/camera.h"
 #include "lapservo/calibration/recording/frame_recording.h"
 #include "lapservo/core/error.h"
+#include "lapservo/io/frame_filter.h"
 #include "recordings/bag_frames.h"
 #include "recordings/open_bag.h"
 
@@ -76,37 +77,22 @@ class IteratedFrames : public FrameSource {
 };
 
 // For threads that share it; called without Python's lock, which others hold while they wait for this one.
-class SharedFrames : public FrameSource {
+class SharedFrames : public internal::FrameFilter {
  public:
-  explicit SharedFrames(std::unique_ptr<FrameSource> source) : source_(std::move(source)) {}
+  using FrameFilter::FrameFilter;
 
   std::optional<Frame> next() override {
     const std::lock_guard lock(mutex_);
-    return source_->next();
+    return FrameFilter::next();
   }
   std::string complaint() const override {
     const std::lock_guard lock(mutex_);
-    return source_->complaint();
+    return FrameFilter::complaint();
   }
-  Kind kind() const override { return source_->kind(); }
-  std::optional<int> frame_count() const override { return source_->frame_count(); }
-  double frames_per_second() const override { return source_->frames_per_second(); }
-  std::optional<double> first_stamp_s() const override { return source_->first_stamp_s(); }
-  std::string remark() const override { return source_->remark(); }
-  bool is_srgb() const override { return source_->is_srgb(); }
-  bool is_lossy() const override { return source_->is_lossy(); }
 
  private:
   mutable std::mutex mutex_;
-  std::unique_ptr<FrameSource> source_;
 };
-
-// Ctrl-C ends the wait for an image as an exception of Python's.
-bool is_interrupted() {
-  const py::gil_scoped_acquire mine;
-  if (PyErr_CheckSignals() != 0) throw py::error_already_set();
-  return false;
-}
 
 void check_rate(double fps) {
   if (!(fps >= 0.001 && fps <= 1000))

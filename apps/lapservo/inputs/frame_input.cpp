@@ -12,6 +12,7 @@
 #include "cameras/camera.h"
 #include "lapservo/calibration/recording/frame_recording.h"
 #include "lapservo/core/error.h"
+#include "lapservo/io/frame_filter.h"
 #include "lapservo/io/video/read_ahead.h"
 #include "recordings/bag_frames.h"
 #include "recordings/open_bag.h"
@@ -30,13 +31,13 @@ namespace {
 
 // One half of each frame, which shows both eyes of an endoscope side by side; `name`: of the source. Throws InputError
 // where their width is odd.
-class HalfFrames : public FrameSource {
+class HalfFrames : public FrameFilter {
  public:
   HalfFrames(std::unique_ptr<FrameSource> source, bool is_left, std::string name)
-      : source_(std::move(source)), is_left_(is_left), name_(std::move(name)) {}
+      : FrameFilter(std::move(source)), is_left_(is_left), name_(std::move(name)) {}
 
   std::optional<Frame> next() override {
-    auto frame = source_->next();
+    auto frame = FrameFilter::next();
     if (!frame || frame->bgr.empty()) return frame;
     if (frame->bgr.cols % 2 != 0)
       throw InputError(name_, "has frames of " + std::to_string(frame->bgr.cols) +
@@ -45,17 +46,8 @@ class HalfFrames : public FrameSource {
     frame->bgr = frame->bgr.colRange(is_left_ ? 0 : width, is_left_ ? width : 2 * width).clone();
     return frame;
   }
-  Kind kind() const override { return source_->kind(); }
-  std::optional<int> frame_count() const override { return source_->frame_count(); }
-  double frames_per_second() const override { return source_->frames_per_second(); }
-  std::optional<double> first_stamp_s() const override { return source_->first_stamp_s(); }
-  std::string remark() const override { return source_->remark(); }
-  bool is_srgb() const override { return source_->is_srgb(); }
-  bool is_lossy() const override { return source_->is_lossy(); }
-  std::string complaint() const override { return source_->complaint(); }
 
  private:
-  std::unique_ptr<FrameSource> source_;
   bool is_left_;
   std::string name_;
 };
@@ -144,7 +136,7 @@ void add_video_options(Command command, FrameOptions& options) {
 }
 
 std::vector<std::string> frame_option_names() {
-  return {"--image-topic", "--eye", "--side-by-side", "--colour-matrix", "--chroma-location", "--fps"};
+  return {"--image-topic", "--eye", "--side-by-side", "--colour-matrix", "--chroma-location", "--fps", "--deinterlace"};
 }
 
 }  // namespace lapservo::app

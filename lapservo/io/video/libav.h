@@ -1,7 +1,9 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <memory>
+#include <string>
 
 extern "C" {
 #include <libavcodec/avcodec.h>
@@ -27,6 +29,11 @@ using Codec = std::unique_ptr<AVCodecContext, Freed<avcodec_free_context>>;
 using Frame = std::unique_ptr<AVFrame, Freed<av_frame_free>>;
 using Packet = std::unique_ptr<AVPacket, Freed<av_packet_free>>;
 using Scaler = std::unique_ptr<SwsContext, FreedScaler>;
+
+/// How FFmpeg takes a file whose name has a colon.
+inline std::string url_of(const std::filesystem::path& file) {
+  return "file:" + file.string();
+}
 
 /// In the stream's time base; 0 where it is not known.
 inline std::int64_t duration_of(const AVFrame& frame) {

@@ -74,7 +74,7 @@ VideoEncoder::VideoEncoder(const std::filesystem::path& path, const std::string&
   av_log_set_level(AV_LOG_QUIET);
   AVFormatContext* file = nullptr;
   avformat_alloc_output_context2(&file, av_guess_format(nullptr, shown.c_str(), nullptr), nullptr,
-                                 ("file:" + path.string()).c_str());
+                                 libav::url_of(path).c_str());
   if (!file) refuse();
   file_.reset(file);
   open_codec(size, frames_per_second, use);
@@ -118,7 +118,7 @@ void VideoEncoder::open_file(const std::filesystem::path& path) {
   if (!stream || avcodec_parameters_from_context(stream->codecpar, codec_.get()) < 0) refuse();
   stream->time_base = codec_->time_base;
   stream->avg_frame_rate = codec_->framerate;
-  need(avio_open(&file_->pb, ("file:" + path.string()).c_str(), AVIO_FLAG_WRITE));
+  need(avio_open(&file_->pb, libav::url_of(path).c_str(), AVIO_FLAG_WRITE));
   AVDictionary* options = nullptr;
   av_dict_set(&options, "movflags", "+faststart", 0);  // the index first, for who plays it while it comes
   const int written = avformat_write_header(file_.get(), &options);

@@ -154,8 +154,7 @@ class VideoReader::State {
     deadline_ = Clock::time_point::max();  // the file keeps asking; whoever measures slowly is not late
   }
 
-  // A file may have a colon in its name.
-  std::string url() const { return kind_ == Kind::file ? "file:" + source_ : source_; }
+  std::string url() const { return kind_ == Kind::file ? libav::url_of(source_) : source_; }
 
   // The first, whatever the others' sizes and bit rates are: recorders of two eyes may write a track for each.
   std::size_t choose_stream() {

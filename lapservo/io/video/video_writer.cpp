@@ -11,7 +11,7 @@ namespace fs = std::filesystem;
 // An index or a header may promise what a full disk did not take.
 int frames_in(const fs::path& path) {
   AVFormatContext* opened = nullptr;
-  if (avformat_open_input(&opened, ("file:" + path.string()).c_str(), nullptr, nullptr) < 0) return 0;
+  if (avformat_open_input(&opened, libav::url_of(path).c_str(), nullptr, nullptr) < 0) return 0;
   const std::unique_ptr<AVFormatContext, libav::Freed<avformat_close_input>> file(opened);
   const libav::Packet packet(av_packet_alloc());
   int found = 0;

@@ -215,9 +215,8 @@ void add_calibrate_registration(Command parent, Run& run_later) {
       "stays the rig's: camera_from_rcm turns with it.\n"
       "Example:\n  lapservo calibrate registration motion.mp4 --joints joints.csv --rig rig.yaml --out rig.yaml");
   command.runs(run_later, [options, command] {
-    std::vector<std::string> of_frames = frame_option_names();
-    of_frames.emplace_back("--deinterlace");
-    if (is_table(options->input)) command.refuse(of_frames, "is of frames, and a CSV of observations has none");
+    if (is_table(options->input))
+      command.refuse(frame_option_names(), "is of frames, and a CSV of observations has none");
     return calibrate_registration(*options);
   });
 }

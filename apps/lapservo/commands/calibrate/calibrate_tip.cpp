@@ -96,10 +96,8 @@ int calibrate_tip(CalibrateTipOptions options, const Command& command) {
     throw InputError("calibrate tip", "takes one way to measure it, expected --pivot, --touch or --calliper");
   if (options.touches.empty())
     command.refuse({"--board", "--square-mm", "--aruco", "--marker-mm"}, "is of a board, expected --touch with it");
-  if (!options.calliper.empty()) {
+  if (!options.calliper.empty())
     command.refuse(frame_option_names(), "is of images, expected --pivot or --touch with it");
-    command.refuse({"--deinterlace"}, "is of images, expected --pivot or --touch with it");
-  }
   options.input = options.pivot + options.touches;  // the one that is given
   Rig rig = load_rig(options.rig);
   const std::size_t index = instrument_meant(rig, options);

@@ -122,8 +122,8 @@ int simulate(const ServoOptions& options) {
   return watcher.commit_log() && watcher.summary().succeeded(options.strict) ? 0 : 1;
 }
 
-int replay_log(const ServoOptions& options, const std::vector<std::string>& given) {
-  for (const std::string& name : given)
+int replay_log(const ServoOptions& options, const Command& command) {
+  for (const std::string& name : command.given())
     if (name != "--replay")
       throw InputError(name, "is given, expected none with a log: rig.yaml and controller.yaml beside it count");
   const fs::path log = options.replay, folder = log.parent_path();
@@ -157,35 +157,32 @@ void check_operator_present(const ServoOptions& options) {
 }
 
 // Options that would be ignored.
-void refuse_idle(const ServoOptions& options, const std::vector<std::string>& given) {
-  const auto refuse = [&](const std::vector<std::string>& names, const char* why) {
-    for (const std::string& name : given)
-      if (std::find(names.begin(), names.end(), name) != names.end()) throw InputError(name, why);
-  };
+void refuse_idle(const ServoOptions& options, const Command& command) {
   const bool recorded = !options.replay.empty(), simulated = options.robot == "sim";
   if (!recorded)
-    refuse({"--image-topic", "--joint-topic", "--eye", "--side-by-side"},
-           "is of a recording, expected --replay with it");
+    command.refuse({"--image-topic", "--joint-topic", "--eye", "--side-by-side"},
+                   "is of a recording, expected --replay with it");
   if (recorded || !simulated)
-    refuse({"--start", "--seed", "--latency-ms", "--registration-error", "--hide"},
-           "is of the simulator, expected --robot sim with it and no --replay");
+    command.refuse({"--start", "--seed", "--latency-ms", "--registration-error", "--hide"},
+                   "is of the simulator, expected --robot sim with it and no --replay");
   if (recorded || simulated)
-    refuse({"--camera", "--endoscope", "--enable-motion", "--setpoint-readers", "--tf-frames"},
-           "is of an arm, expected --robot ros2:NAMESPACE or ros1:NAMESPACE with it and no --replay");
+    command.refuse({"--camera", "--endoscope", "--enable-motion", "--setpoint-readers", "--tf-frames"},
+                   "is of an arm, expected --robot ros2:NAMESPACE or ros1:NAMESPACE with it and no --replay");
   if (recorded || (simulated && !options.web.port))
-    refuse({"--control"}, "is of an arm or a page, expected --robot of an arm or --web with it and no --replay");
+    command.refuse({"--control"},
+                   "is of an arm or a page, expected --robot of an arm or --web with it and no --replay");
 }
 
-int run(const ServoOptions& options, const std::vector<std::string>& given) {
+int run(const ServoOptions& options, const Command& command) {
   options.web.check();
   check_operator_present(options);
   const bool recorded = !bag_of(options.replay).empty();
   if (!options.replay.empty() && options.web.port)
     throw InputError("--web", "is for runs, expected none with --replay");
-  if (!options.replay.empty() && !recorded) return replay_log(options, given);
+  if (!options.replay.empty() && !recorded) return replay_log(options, command);
   if (options.rig.empty())
     throw InputError("--rig", "is missing, expected a rig's YAML, for example configs/paper.yaml");
-  refuse_idle(options, given);
+  refuse_idle(options, command);
   if (recorded) return decide_on_recording(options);
   if (!options.hide.empty() && !(options.hide[0] < options.hide[1]))
     throw InputError("--hide", "expected from,to in seconds, the later one last");
@@ -319,7 +316,7 @@ void add_servo(Command app, Run& run_later) {
       "  lapservo servo --rig configs/paper.yaml --robot ros2:PSM1 --camera /dev/video0 --web\n"
       "  lapservo servo --replay run/log.csv\n"
       "  lapservo servo --replay swing.bag --rig rig.yaml --out decided");
-  command.runs(run_later, [options, command] { return run(*options, command.given()); });
+  command.runs(run_later, [options, command] { return run(*options, command); });
 }
 
 }  // namespace lapservo::app
