@@ -195,6 +195,10 @@ Trajectory trajectory_through(std::vector<double> times_s, std::vector<Eigen::Ve
     if (row > 0) features[row][0] = features[row - 1][0] + wrap_pi(features[row][0] - features[row - 1][0]);
   }
   const double start_s = times_s.front(), end_s = times_s.back();
+  constexpr double latest_start_s = 3600;
+  if (!(start_s >= 0 && start_s <= latest_start_s))
+    throw InputError(source, "row 1.time_s", std::to_string(start_s),
+                     "seconds since the start of the motion, 0 to 3600: subtract the first row's time from all");
   return between(start_s, end_s, [spline = natural_spline(std::move(times_s), std::move(features))](double time_s) {
     return spline_at(spline, time_s);
   });

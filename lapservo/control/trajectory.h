@@ -55,8 +55,9 @@ Trajectory sinusoids(const Sinusoids& sinusoids);
 /// Throws InputError for fewer than two points and rates that are not positive.
 Trajectory via_points(const std::vector<Eigen::Vector4d>& points, const Eigen::Vector4d& max_rate, double dwell_s = 0);
 
-/// Natural cubic spline (twice continuously differentiable) through two points or more with times that increase; starts
-/// at the first one's time. s is unwrapped. Throws InputError naming `source`, row and field.
+/// Natural cubic spline (twice continuously differentiable) through two points or more with times that increase, the
+/// first between 0 and 3600 s, where it rests until then. s is unwrapped. Throws InputError naming `source`, row and
+/// field.
 Trajectory trajectory_through(std::vector<double> times_s, std::vector<Eigen::Vector4d> features,
                               const std::string& source);
 /// The tip's, at rest. Throws InputError, naming `source`, for numbers that are not finite and places farther than 1 m

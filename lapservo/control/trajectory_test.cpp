@@ -105,6 +105,8 @@ TEST(Trajectory, BadInputIsNamed) {
   EXPECT_NE(message(header + "0,1,2,3,4\n1,1,2,x,4\n").find("l_px"), std::string::npos);
   EXPECT_NE(message("time_s,s_rad\n0,1\n1,1\n").find("r_px"), std::string::npos);
   EXPECT_NE(message(header + "0,1,2,3,4\n").find("two rows"), std::string::npos);
+  EXPECT_NE(message(header + "1.7e9,1,2,3,4\n1.8e9,1,2,3,4\n").find("since the start"), std::string::npos);
+  EXPECT_NE(message(header + "-1,1,2,3,4\n1,1,2,3,4\n").find("since the start"), std::string::npos);
   EXPECT_THROW(sinusoids({Eigen::Vector4d::Zero(), Eigen::Vector4d::Zero(), {1, 0, 1, 1}, Eigen::Vector4d::Zero()}),
                InputError);
   EXPECT_THROW(via_points({Eigen::Vector4d::Zero()}, Eigen::Vector4d::Ones()), InputError);

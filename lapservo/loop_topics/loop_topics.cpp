@@ -71,8 +71,7 @@ Trajectory trajectory_of(const TrajectoryMessage& message) {
   const bool turns = message.names == turned_places, of_tip = turns || message.names == places;
   if (!of_tip && message.names != feature_names())
     throw InputError("trajectory", "expected the names s_rad, r_px, l_px, d_px, or x_m, y_m, z_m with roll_rad or not");
-  if (message.points.empty() || message.points.size() > most || !(message.points.front().time_s >= 0) ||
-      !(message.points.back().time_s <= longest_s))
+  if (message.points.empty() || message.points.size() > most || !(message.points.back().time_s <= longest_s))
     throw InputError("trajectory", fmt::format("expected 2 to {} points between 0 and {} s", most, longest_s));
   std::vector<double> times_s;
   std::vector<Eigen::Vector4d> features;

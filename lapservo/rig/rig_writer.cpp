@@ -187,6 +187,18 @@ std::string instrument_yaml(const Instrument& instrument, const fs::path& destin
   return fmt::format("  - name: {}\n{}", quoted(instrument.name), lines.text());
 }
 
+template <typename Read>
+bool is_file_of(const Read& read, const fs::path& path) {
+  std::error_code error;
+  if (!fs::is_regular_file(path, error)) return false;
+  try {
+    read(path);
+    return true;
+  } catch (const InputError&) {
+    return false;
+  }
+}
+
 }  // namespace
 
 std::string camera_yaml(const Camera& camera, int indent) {
@@ -247,18 +259,15 @@ std::string measured_rig_yaml(const Rig& rig, const fs::path& destination) {
 }
 
 void refuse_rig_over_part(const fs::path& destination) {
-  const auto is_read_by = [&](const auto& read) {
-    try {
-      read(destination);
-      return true;
-    } catch (const InputError&) {
-      return false;
-    }
-  };
-  std::error_code error;
-  if (fs::is_regular_file(destination, error) && (is_read_by(load_camera) || is_read_by(read_dvrk_tool)))
+  if (is_file_of(load_camera, destination) || is_file_of(read_dvrk_tool, destination))
     throw InputError(destination.string(),
                      "is the file of a camera or a tool, which a whole rig would replace: expected another name");
+}
+
+void refuse_part_over_rig(const fs::path& destination, const std::string& part) {
+  if (is_file_of(load_rig, destination))
+    throw InputError(destination.string(),
+                     "is a rig, which its " + part + " alone would replace: expected another name");
 }
 
 }  // namespace lapservo::internal

@@ -17,6 +17,9 @@ std::string measured_rig_yaml(const Rig& rig, const std::filesystem::path& desti
 /// Throws InputError where a rig would replace the file of a camera or a tool, which rigs may name.
 void refuse_rig_over_part(const std::filesystem::path& destination);
 
+/// Throws InputError where a rig would be replaced by `part`, a part of one.
+void refuse_part_over_rig(const std::filesystem::path& destination, const std::string& part);
+
 /// The lines of a camera file, or of a rig's `camera`, each after so many spaces.
 std::string camera_yaml(const Camera& camera, int indent = 0);
 

@@ -176,6 +176,9 @@ TEST(RigWriter, ReplacesNoFileOfACameraOrATool) {
   for (const char* part : {"camera.yaml", "tool.json", "link.yaml"})
     EXPECT_TRUE(has(input_error([&] { refuse_rig_over_part(folder / part); }), "rig would replace")) << part;
   for (const char* place : {"rig.yaml", "new.yaml", "."}) EXPECT_NO_THROW(refuse_rig_over_part(folder / place));
+  EXPECT_TRUE(has(input_error([&] { refuse_part_over_rig(folder / "rig.yaml", "camera"); }), "is a rig"));
+  for (const char* place : {"camera.yaml", "tool.json", "new.yaml", "."})
+    EXPECT_NO_THROW(refuse_part_over_rig(folder / place, "camera"));
 }
 
 }  // namespace

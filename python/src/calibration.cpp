@@ -282,7 +282,7 @@ void bind_calibration(py::module_& m) {
   m.def("_calibrate_marker", &calibrate_marker);
   m.def("_calibrate_registration", &calibrate_registration);
   m.def("_write_calibrated", [](const std::optional<Rig>& rig, const std::string& yaml, const fs::path& path) {
-    if (rig) refuse_rig_over_part(path);
+    rig ? refuse_rig_over_part(path) : refuse_part_over_rig(path, "camera");
     write_file(path, rig ? measured_rig_yaml(*rig, path) : yaml);
   });
 }

@@ -160,6 +160,13 @@ def test_a_cameras_own_file_is_named_from_anywhere_and_never_written_over(record
     assert lens.read_bytes() == before
 
 
+def test_a_camera_alone_replaces_no_rig(sample, tmp_path):
+    shutil.copy(sample / "rig.yaml", tmp_path / "rig.yaml")
+    result = lapservo.calibrate_camera(sample / "boards", "9x6", 0.005)
+    assert "is a rig" in refused(result.save, tmp_path / "rig.yaml").problem
+    result.save(tmp_path / "camera.yaml")
+
+
 def test_a_fit_asks_for_signals(boards):
     asked = []
     before = signal.signal(signal.SIGALRM, lambda *_: asked.append(True))

@@ -95,7 +95,7 @@ int run_design(const DesignOptions& options) {
   if (options.hues_deg.size() != 3) throw InputError("--hues", "needs three hues, like 90,180,270");
   const Viewing viewing = options.viewing.viewing(usual_focal_px);
   std::optional<AtomicFile> file;
-  refuse_other_kind(options.out, ".yaml"), refuse_over_rig(options.out, "marker");
+  refuse_other_kind(options.out, ".yaml"), refuse_part_over_rig(options.out, "marker");
   if (!options.out.empty()) file.emplace(options.out);
   const bool given = !options.upper_mm.empty() || !options.lower_mm.empty();
   Marker marker;

@@ -39,16 +39,6 @@ void refuse_other_kind(const fs::path& result, const std::string& ending) {
     throw InputError(result.string(), "name", own, "one that ends in " + ending);
 }
 
-void refuse_over_rig(const fs::path& result, const std::string& part) {
-  try {
-    if (!identity_of(result)) return;
-    load_rig(result);
-  } catch (const InputError&) {
-    return;
-  }
-  throw InputError(result.string(), "is a rig, which its " + part + " alone would replace: expected another name");
-}
-
 void InputFiles::add(const fs::path& path) {
   if (const auto identity = identity_of(path)) files_.emplace(*identity, path);
 }

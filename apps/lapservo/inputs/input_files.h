@@ -16,8 +16,6 @@ void refuse_shared_place(const std::vector<std::filesystem::path>& places);
 /// Throws InputError for a result whose name ends as a file of another kind does: a table `rig.yaml` would replace a
 /// rig. `ending`: ".csv" for example; an empty name is none.
 void refuse_other_kind(const std::filesystem::path& result, const std::string& ending);
-/// Throws InputError where a rig would be replaced by `part`, a part of one.
-void refuse_over_rig(const std::filesystem::path& result, const std::string& part);
 
 /// The regular files that a command reads, so that none of them is written over, by whatever name or link.
 class InputFiles {

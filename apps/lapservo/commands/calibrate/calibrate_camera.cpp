@@ -32,7 +32,7 @@ void check_files(const CalibrateCameraOptions& options, const std::optional<Rig>
   refuse_shared_place({options.rig_out(), options.camera_info});
   for (const std::string& place : {options.camera_info, rig ? std::string() : options.out}) {
     refuse_other_kind(place, ".yaml");
-    refuse_over_rig(place, "camera");
+    refuse_part_over_rig(place, "camera");
   }
   if (!rig) return;
   refuse_rig_over_part(options.rig_out());
