@@ -15,6 +15,7 @@
 #include "acceptance/tally.h"
 #include "lapservo/calibration/marker/marker_calibration.h"
 #include "lapservo/calibration/marker/marker_measurement.h"
+#include "lapservo/calibration/marker/print_adjustment.h"
 #include "lapservo/calibration/recording/test_frames.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/core/random.h"

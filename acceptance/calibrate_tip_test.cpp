@@ -19,8 +19,7 @@
 
 #include "acceptance/laboratory.h"
 #include "acceptance/tool_test.h"
-#include "lapservo/calibration/tip/tip_ways.h"
-#include "lapservo/calibration/tip/tool_place.h"
+#include "lapservo/calibration/tip/tip_fit.h"
 #include "lapservo/core/dense_matrix.h"
 #include "lapservo/core/statistics.h"
 #include "lapservo/io/image_file.h"
@@ -68,11 +67,6 @@ struct Orientation {
   double right_rad = 0, down_rad = 0, roll_rad = 0;
 };
 
-Eigen::Quaterniond rotation_at(const Orientation& at) {
-  return rotation_by({at.down_rad, at.right_rad, 0}) * rotation_between(Eigen::Vector3d::UnitZ(), usual_axis) *
-         rotation_by({0, 0, at.roll_rad});
-}
-
 // A laboratory's instrument before a background.
 class Scene {
  public:
@@ -82,7 +76,9 @@ class Scene {
         renderer_(laboratory(seed).camera, shafts_of(laboratory(seed)), background, with_noise(1)) {}
 
   cv::Mat image(const Orientation& at, const Eigen::Vector3d& tip_in_marker_m, const Eigen::Vector3d& tip_in_camera_m) {
-    const Eigen::Quaterniond turn = rotation_at(at);
+    const Eigen::Quaterniond turn = rotation_by({at.down_rad, at.right_rad, 0}) *
+                                    rotation_between(Eigen::Vector3d::UnitZ(), usual_axis) *
+                                    rotation_by({0, 0, at.roll_rad});
     const Rigid3 marker_in_camera{turn, tip_in_camera_m - turn * tip_in_marker_m};
     const Rigid3 marker_from_unrolled = camera_from_marker(marker_, {}, 0).inverse();
     return renderer_.render({{marker_in_camera * marker_from_unrolled, 0}}, 1000 * seed_ + count_++);

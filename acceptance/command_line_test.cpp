@@ -8,7 +8,6 @@
 #include <filesystem>
 #include <fstream>
 #include <regex>
-#include <set>
 #include <string>
 #include <sys/stat.h>
 #include <utility>
@@ -66,8 +65,7 @@ class CommandLine : public acceptance::ToolTest {
   }
 
 #ifdef LAPSERVO_TEST_BAGS
-  // in/run.bag, in/run (a bag of ROS 2) and in/run.mcap: a folder's images as PNG, and joints, by a clock that is so
-  // far ahead.
+  // in/run.bag and in/run.mcap: a folder's images as PNG, and joints, by a clock that is so far ahead.
   void write_bags_of(const std::string& pictures, double fps, const CsvTable& joints, double arms_clock_s = 0) {
     constexpr double begin_s = 1700000000;
     std::vector<lapservo::testing::BagEntry> ros1, ros2;
@@ -93,9 +91,6 @@ class CommandLine : public acceptance::ToolTest {
           CompressedImageMessage{begin_s + i / fps, "png", {png.begin(), png.end()}}, begin_s + i / fps);
     }
     lapservo::testing::write_ros1_bag("in/run.bag", ros1, "lz4");
-    fs::create_directories("in/run");
-    lapservo::testing::write_ros2_bag("in/run/run_0.db3", ros2);
-    lapservo::testing::write_ros2_metadata("in/run", {"run_0.db3"});
     lapservo::testing::write_mcap("in/run.mcap", ros2, {"zstd", 8, true, true});
   }
   // in/session of dvrk_data: a folder's images as the right eye, on the left of a video, and the joints of
@@ -153,6 +148,7 @@ TEST_F(CommandLine, RenderThenTrack) {
     EXPECT_NEAR(observed.number(row, "l_px"), truth.number(row, "l_px"), 0.2);
     EXPECT_TRUE(fs::exists("out/overlay/" + truth.text(row, "file")));
   }
+  EXPECT_LT(run("track out/frames --method centerline --out out/c.csv"), 2) << errors();
 }
 
 TEST_F(CommandLine, OneOfTwoEyesSideBySideIsMeasuredAsByItself) {
@@ -177,14 +173,6 @@ TEST_F(CommandLine, OneOfTwoEyesSideBySideIsMeasuredAsByItself) {
   ToolTest::expect_refused("track in/pairs" + refused, {"2560x720"});
   ToolTest::expect_refused("track in/pairs --side-by-side RL" + refused, {"--eye: is missing"});
   ToolTest::expect_refused("track in/odd.png --eye left" + refused, {"1281 columns"});
-}
-
-TEST_F(CommandLine, VideosAndTheBaseline) {
-  expect_done("render --rig configs/example.yaml --out out/film --count 6 --moving --video");
-  expect_done("track out/film/video.mp4 --out out/obs.csv --overlay out/overlay.mp4");
-  EXPECT_EQ(CsvTable::read("out/obs.csv").rows(), 6U);
-  EXPECT_GT(fs::file_size("out/overlay.mp4"), 1000U);
-  expect_done("track out/film/video.mp4 --method centerline --out out/c.csv");
 }
 
 #ifdef LAPSERVO_GST
@@ -244,30 +232,17 @@ TEST_F(CommandLine, UnknownWordsGetTheNearestKnownOne) {
   expect_refused("calibrate color in/a.png", {"color is unknown, the nearest is colour"});
 }
 
-TEST_F(CommandLine, RenderingWhatCannotBe) {
-  std::string text = read_file("configs/example.yaml");
-  text.erase(text.find("    camera_from_rcm"));
-  expect_refused("render --rig " + in("free.yaml", text) + " --out out/frames",
-                 {"free.yaml", "camera_from_rcm", "missing"});
-}
-
 TEST_F(CommandLine, Markers) {
-  expect_done("marker design --diameter-mm 8.4 --out out/marker.yaml");
-  expect_in(read_file("out/marker.yaml"), "bands_upper_m");
-  for (const char* name : {"out/sheet.pdf", "out/sheet.svg"}) {
-    expect_done(std::string("marker print --rig configs/example.yaml --out ") + name);
-    EXPECT_GT(fs::file_size(name), 1000U);
-  }
-  expect_done("marker show --rig configs/example.yaml --out out/marker.png");
-  expect_in(output(), "by all visible lines");
-  expect_in(output(), "222");
+  std::string unregistered = read_file("configs/example.yaml");
+  unregistered.erase(unregistered.find("    camera_from_rcm"));
+  expect_refused("render --rig " + in("free.yaml", unregistered) + " --out out/frames",
+                 {"free.yaml", "camera_from_rcm", "missing"});
   const std::string zoomed =
       in("zoomed.yaml", std::regex_replace(read_file("configs/example.yaml"), std::regex("1100, 0"), "825, 0"));
   expect_done("marker show --rig " + zoomed);
   expect_in(output(), "focal length of 825 px");
   expect_done("marker show --rig configs/example.yaml --focal-px 900");
   expect_in(output(), "focal length of 900 px");
-  empty_out();
   expect_refused("marker design --bands-upper-mm 5,5,10 --bands-lower-mm 10,5,5", {"not decodable"});
   expect_refused("marker design --diameter-mm 8 --length-mm 8", {"do not fit"});
   expect_refused("marker print --rig configs/example.yaml --out out/sheet.txt", {"sheet.txt"});
@@ -297,6 +272,9 @@ TEST_F(CommandLine, ServoRunsAndReplays) {
     expect_done("servo --replay " + folder + "/log.csv");
     expect_in(output(), "180 ticks reproduced bit for bit");
   }
+  const std::string log = read_file("out/off/log.csv");
+  write_file("out/off/log.csv", log.substr(0, log.find('\n') + 1));
+  ToolTest::expect_refused("servo --replay out/off/log.csv", {"log.csv", "holds no tick"});
   // It converges, and then ends in a hold.
   expect_failed("servo --rig configs/paper.yaml --robot sim --duration 5.5 --seed 2 --hide 5,9",
                 {"within 1 px and 5 mrad from", "ended in a hold: marker_lost"});
@@ -385,13 +363,6 @@ TEST_F(CommandLine, TheLeastFramesASecondThatServoTakesWork) {
   expect_refused(servo + " --fps 5 --out out/run", {"--fps", "expected a number of 6"});
 }
 
-TEST_F(CommandLine, ALogWithoutPeriodsIsNoSuccess) {
-  run("servo --rig configs/paper.yaml --robot sim --duration 0.1 --out in/run");
-  const std::string log = read_file("in/run/log.csv");
-  write_file("in/run/log.csv", log.substr(0, log.find('\n') + 1));
-  expect_refused("servo --replay in/run/log.csv", {"log.csv", "holds no tick"});
-}
-
 TEST_F(CommandLine, ServoRefusesWhatCanNotBe) {
   const std::string servo = "servo --rig configs/paper.yaml --out out/run";
   expect_refused(servo, {"--robot", "sim"});
@@ -430,18 +401,13 @@ TEST_F(CommandLine, ExperimentsWriteAReport) {
   expect_refused("experiment cooking --out out/report", {"cooking"});
 }
 
-// And what becomes of files that are there.
 TEST_F(CommandLine, HelpShowsExamples) {
-  const std::set<std::string> of_files{"track", "estimate-rcm", "marker design", "marker print", "marker show"};
   for (const char* command :
        {"track", "view", "render", "marker", "marker design", "marker print", "marker show", "servo", "experiment",
         "estimate-rcm", "sim-robot", "record", "check", "calibrate", "calibrate all", "calibrate camera",
         "calibrate colour", "calibrate marker", "calibrate registration"}) {
     expect_done(std::string(command) + " --help");
     expect_in(output(), "Example");
-    if (of_files.contains(command)) expect_in(output(), "repla");
-    for (const std::string of_folders : {"render", "servo", "experiment"})
-      if (command == of_folders) expect_in(output(), "--force"), expect_in(output(), "unfinished");
   }
   expect_done("align --help");
   expect_in(output(), "Example");
@@ -563,7 +529,6 @@ TEST_F(CommandLine, CalibrateRegistrationWritesWhereTheArmStands) {
       "align in/swing --fps 8 --rig " + unregistered + " --out out/aligned.yaml --report out/align.html";
   ToolTest::expect_refused(align, {"--joints: is missing"});
   expect_done(align + " --joints " + in("later.csv", joints_by_clock(20 - clock_s)));
-  expect_in(output(), "no drift of the clocks shows");
   EXPECT_NEAR(load_rig("out/aligned.yaml").instruments[0].image_delay_s.value(), clock_s - 20, 5e-3);
   expect_in(read_file("out/align.html"), "as the marker shows it");
   expect_done(
@@ -577,7 +542,6 @@ TEST_F(CommandLine, CalibrateRegistrationWritesWhereTheArmStands) {
   for (const char* figure : {"Rotation against encoder", "alt=\"Colours\""})
     expect_in(read_file("out/check.html"), figure);
   expect_failed(check + unregistered, {"not good enough: the rig has no camera_from_rcm"});
-  EXPECT_EQ(run(check + "out/rig.yaml --out out/rig.yaml"), 2);
   EXPECT_EQ(run("check in/nothing --rig out/rig.yaml"), 2);
 
   // A refused calibration leaves the existing file.
@@ -619,14 +583,6 @@ TEST_F(CommandLine, CalibrateRegistrationWritesWhereTheArmStands) {
 #ifdef LAPSERVO_TEST_BAGS
   write_bags_of("swing", fps, CsvTable::read("in/with_wrist.csv"));
   expect_tracked_as("out/bound.csv", "in/run.bag", "out/rig.yaml");
-  expect_done("calibrate registration in/run --rig " + unregistered + " --out out/bag.yaml");
-  const Instrument of_bag = load_rig("out/bag.yaml").instruments[0];
-  constexpr double within = 1e-5;
-  EXPECT_EQ(of_bag.joints->sign, found.joints->sign);
-  for (std::size_t i = 0; i < 4; ++i) EXPECT_NEAR(of_bag.joints->offset[i], found.joints->offset[i], within);
-  EXPECT_NEAR(of_bag.image_delay_s.value(), found.image_delay_s.value(), within);
-  const Rigid3 moved = of_bag.camera_from_rcm->inverse() * *found.camera_from_rcm;
-  EXPECT_LE(moved.translation.norm() + moved.rotation.vec().norm(), within);
   // The loop over the same recording; what it decided is a run's log like any other.
   const std::string decide = "servo --replay in/run.bag --rig ";
   expect_done(decide + "out/rig.yaml --out out/decided");
@@ -636,13 +592,10 @@ TEST_F(CommandLine, CalibrateRegistrationWritesWhereTheArmStands) {
   // A goal of the tip needs the wrist as it was recorded.
   expect_done(decide + with_tool + " --tip 0.0371,-0.0006,0.1602");
   const CsvTable decided = CsvTable::read("out/decided/log.csv");
-  EXPECT_EQ(run(decide + "out/rig.yaml --out out/decided"), 2);
-  EXPECT_EQ(run(decide + "out/rig.yaml --enable-motion"), 2);
   ToolTest::expect_refused(decide + "configs/example.yaml", {"joints is missing"});
   ToolTest::expect_refused(decide + "out/rig.yaml --joint-topic /PSM2/measured_js", {"/PSM1/measured_js"});
   // An arm's clock that is wrong changes no decision.
   for (const double off_s : {-7.5, 2.0}) {
-    fs::remove_all("in/run");
     write_bags_of("swing", fps, CsvTable::read("in/joints.csv"), off_s);
     expect_done(decide + "out/rig.yaml --force --out out/decided");
     expect_in(output(), off_s < 0 ? "the arm's clock is 7.50 s behind the camera's" : "2.00 s ahead of the camera's");
@@ -653,7 +606,6 @@ TEST_F(CommandLine, CalibrateRegistrationWritesWhereTheArmStands) {
           << i;
   }
   // The same as a session of dvrk_data, through H.264.
-  fs::remove_all("in/run");
   write_bags_of("swing", fps, CsvTable::read("in/joints.csv"));
   write_session_of("swing", fps);
   const std::string session = "in/session --eye right --rig ";
@@ -696,14 +648,6 @@ TEST_F(CommandLine, CalibratesACamera) {
       expect_in(text, key);
 }
 
-// It must not even be read: nobody writes into this one.
-TEST_F(CommandLine, CalibrateAllRefusesARigThatCanNotBeReplaced) {
-  const std::string pipe = "in/pipe";
-  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
-  expect_refused("calibrate all --no-questions --rig " + pipe,
-                 {"pipe: is a pipe or a device", "each step replaces it"});
-}
-
 // Without a recording there is nothing to do, and a rig that somebody edits is another.
 TEST_F(CommandLine, CalibrateAllSaysWhatItDidNot) {
   const std::string start = "calibrate all --no-questions --rig " + in("mine.yaml", read_file("configs/example.yaml"));
@@ -719,6 +663,9 @@ TEST_F(CommandLine, CalibrateAllSaysWhatItDidNot) {
   expect_refused(start + " --joint-topic /x --turn in/grey.png", {"--joint-topic: is /x, which is for bags"});
   expect_refused(start + " --report page.yaml", {"page.yaml", ".html"});
   expect_refused(start + " --turn /dev/video0", {"expected a folder with files"});
+  ASSERT_EQ(::mkfifo("in/pipe", 0600), 0);  // it must not even be read: nobody writes into this one
+  expect_refused("calibrate all --no-questions --rig in/pipe",
+                 {"pipe: is a pipe or a device", "each step replaces it"});
 }
 
 // Though the check was done.
@@ -748,12 +695,9 @@ TEST_F(CommandLine, CalibrateAllTakesTheSwingsJointsForNoOtherRecording) {
   expect_in(output(), "lapservo check in/grey.png --rig in/mine.yaml --fps 30");
 }
 
-TEST_F(CommandLine, SamplesGoIntoAnEmptyFolder) {
+TEST_F(CommandLine, CalibrationsAndRecordingsRefuseWhatTheyWouldIgnore) {
   in("kept", "");
   expect_refused("sample in", {"in: is not empty, expected a new or an empty folder"});
-}
-
-TEST_F(CommandLine, CalibrationsAndRecordingsRefuseWhatTheyWouldIgnore) {
   const std::string to = " --rig configs/example.yaml --out out/rig.yaml";
   expect_refused("calibrate registration in/seen.csv --fps 8" + to, {"--fps: is of frames", "a CSV"});
   expect_refused("calibrate tip --calliper 20 --eye left" + to, {"--eye", "--pivot"});

@@ -29,10 +29,9 @@ namespace {
 struct DynamicTick {
   double time_s = 0;
   ServoDecision decision;
-  Eigen::Vector4d error = Eigen::Vector4d::Zero();           ///< true features minus desired, when it began
-  Eigen::Vector4d fastest = Eigen::Vector4d::Zero();         ///< of the instrument's joints, until the next
-  Eigen::Vector4d setpoint_ahead = Eigen::Vector4d::Zero();  ///< of the measured joints, when it ended
-  Eigen::Vector3d tip_m = Eigen::Vector3d::Zero();           ///< the true one in the camera's frame, when it began
+  Eigen::Vector4d error = Eigen::Vector4d::Zero();    ///< true features minus desired, when it began
+  Eigen::Vector4d fastest = Eigen::Vector4d::Zero();  ///< of the instrument's joints, until the next
+  Eigen::Vector3d tip_m = Eigen::Vector3d::Zero();    ///< the true one in the camera's frame, when it began
 };
 
 /// The servo loop around MuJoCo's arm, with a camera that gives features instead of images: 60 ticks and 30 frames a
@@ -52,8 +51,6 @@ class DynamicLoop {
   std::function<void(double time_s, MujocoArm& arm)> meddle = [](double, MujocoArm&) {};
   /// The image from its beginning arrives again and again, from a camera whose noise is known.
   std::optional<Interval> frozen{};
-  /// The part of the configuration that an image determines, as where a registration fits.
-  bool images_know_q = true;
   std::function<std::vector<double>(double time_s)> wrist_rad = [](double) { return std::vector<double>(); };
 
   std::vector<DynamicTick> run(const Trajectory& trajectory, double duration_s) {
@@ -77,7 +74,8 @@ class DynamicLoop {
                         OperatingState::enabled};
       joints.wrist_rad = wrist_rad(tick.time_s);
       tips.follow(joints);
-      const Rigid3 camera_from_marker = marker_in(scene, arm);
+      const Rigid3 camera_from_marker = lapservo::camera_from_marker(
+          scene.instruments[0].marker, *scene.instruments[0].camera_from_rcm, JointVector::from_vector(arm.true_jp()));
       if (rig.instruments[0].tool)
         tick.tip_m =
             camera_from_marker * tip_in_marker(*rig.instruments[0].tool, joints.wrist_rad).marker_from_tip.translation;
@@ -105,11 +103,6 @@ class DynamicLoop {
   }
 
  private:
-  static Rigid3 marker_in(const Rig& scene, const MujocoArm& arm) {
-    const Instrument& instrument = scene.instruments[0];
-    return lapservo::camera_from_marker(instrument.marker, *instrument.camera_from_rcm,
-                                        JointVector::from_vector(arm.true_jp()));
-  }
   ImageMeasurement exposed(const FeatureState& seen, const Rigid3& camera_from_marker, const Eigen::Vector4d& q,
                            double stamp_s, Random& random) const {
     const Eigen::Vector4d sigma(4e-4, 0.15, 0.15, 0.15);
@@ -126,7 +119,7 @@ class DynamicLoop {
     image.camera_from_marker = Rigid3{rotation_by(noise(0.5e-3)) * camera_from_marker.rotation,
                                       camera_from_marker.translation + noise(0.02e-3)};
     image.covariance = sigma.cwiseAbs2().asDiagonal();
-    if (images_know_q) image.q = q;
+    image.q = q;
     return image;
   }
   void freeze(ImageMeasurement& image) {
@@ -144,7 +137,6 @@ class DynamicLoop {
       arm.step(period_s / parts);
       tick.fastest = tick.fastest.cwiseMax(arm.true_velocity().cwiseAbs());
     }
-    tick.setpoint_ahead = arm.setpoint() - arm.measured_jp();
   }
 
   std::optional<ImageMeasurement> shown_{};

@@ -13,9 +13,9 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/core/csv.h"
 #include "lapservo/core/random.h"
+#include "lapservo/io/frame_source.h"
 #include "lapservo/io/image_file.h"
-#include "lapservo/io/video/video_encoder.h"
-#include "lapservo/io/video/video_reader.h"
+#include "lapservo/io/video/video_writer.h"
 #include "lapservo/kinematics/centre_line.h"
 #include "lapservo/kinematics/visibility.h"
 #include "lapservo/sim/instrument_shaft.h"
@@ -156,19 +156,9 @@ std::vector<TrueFrame> rendered_frames(const RenderedSet& set) {
   for (std::size_t f = 0; f < set.configurations.size(); ++f) {
     TrueFrame frame{rig, {}, {}};
     const auto& now = set.configurations[f];
-    const auto& next = set.configurations[std::min(f + 1, set.configurations.size() - 1)];
-    Exposure exposure;
-    const int moments = set.motion > 0 ? 9 : 1;
-    for (int m = 0; m < moments; ++m) {
-      const double fraction = moments > 1 ? set.motion * (m / (moments - 1.0) - 0.5) : 0;
-      std::vector<ShaftPlacement> placed;
-      for (std::size_t i = 0; i < now.size(); ++i) {
-        const auto q = JointVector::from_vector(now[i].vector() + fraction * (next[i].vector() - now[i].vector()));
-        placed.push_back(placement_of(rig.instruments[i], q));
-      }
-      exposure.push_back(placed);
-    }
-    frame.bgr = renderer.render_exposure(exposure, set.seed * 1000 + f);
+    std::vector<ShaftPlacement> placed;
+    for (std::size_t i = 0; i < now.size(); ++i) placed.push_back(placement_of(rig.instruments[i], now[i]));
+    frame.bgr = renderer.render(placed, set.seed * 1000 + f);
     if (set.after) frame.bgr = set.after(frame.bgr);
     for (std::size_t i = 0; i < now.size(); ++i) frame.truths.push_back(truth_of(rig, i, now[i]));
     frames.push_back(std::move(frame));
@@ -200,20 +190,20 @@ void compress(std::vector<TrueFrame>& frames, Encoder encoder) {
   const testing::TemporaryFolder folder;
   const auto path = folder.path() / "frames.mp4";
   if (encoder == Encoder::lapservo) {
-    VideoEncoder writer(path, "frames.mp4", frames.at(0).bgr.size(), 30, VideoUse::shown);
+    VideoWriter writer(path, 30);
     for (const TrueFrame& frame : frames) writer.add(frame.bgr);
-    writer.finish();
+    writer.commit();
   } else if (encoder == Encoder::ffmpeg) {
     record_by_ffmpeg(frames, path);
   } else {
-    // VideoWriter's own choice is MPEG-4 part 2.
+    // cv::VideoWriter's own choice is MPEG-4 part 2.
     cv::VideoWriter writer(path.string(), cv::CAP_FFMPEG, cv::VideoWriter::fourcc('a', 'v', 'c', '1'), 30,
                            frames.at(0).bgr.size());
     if (!writer.isOpened()) throw std::runtime_error("no encoder of H.264");
     for (const TrueFrame& frame : frames) writer.write(frame.bgr);
   }
-  VideoReader reader(path);
-  for (TrueFrame& frame : frames) frame.bgr = reader.next().value().bgr.clone();
+  const auto video = open_frame_source(path.string(), 30);
+  for (TrueFrame& frame : frames) frame.bgr = video->next().value().bgr.clone();
 }
 
 std::vector<std::vector<JointVector>> random_configurations(const Rig& rig, int count, std::uint64_t seed,

@@ -68,8 +68,7 @@ struct RenderedSet {
   Rig rig;
   std::vector<std::vector<JointVector>> configurations;  ///< per frame and instrument
   RenderOptions options;
-  double blood = 0;   ///< fraction of the marker covered
-  double motion = 0;  ///< fraction of the step to the next frame
+  double blood = 0;  ///< fraction of the marker covered
   std::uint64_t seed = 1;
   std::function<cv::Mat(const cv::Mat&)> after;  ///< what the recorder does, when given
 };

@@ -61,13 +61,6 @@ void bleed_over(const Marker& print, std::size_t boundary, double of_turn, std::
   }
 }
 
-std::vector<Blotch> blood_of(const Kind& kind, const Marker& print, Random& random) {
-  std::vector<Blotch> blood = blood_over(print, random.uniform(0.7, 1) * kind.beside, random);
-  for (const std::size_t boundary : kind.hidden) bleed_over(print, boundary, kind.of_turn, blood, random);
-  if (kind.partly >= 0) bleed_over(print, static_cast<std::size_t>(kind.partly), 0.5, blood, random);
-  return blood;
-}
-
 class HiddenBoundaries : public ::testing::Test {
  protected:
   const int pictures = from_environment("LAPSERVO_HIDDEN", 4);
@@ -79,8 +72,10 @@ class HiddenBoundaries : public ::testing::Test {
     Random random(static_cast<std::uint64_t>(seed) * 1'000'000 + static_cast<std::uint64_t>(number));
     const Instrument& instrument = rig.instruments[0];
     ShaftModel shaft = shaft_of(instrument);
-    shaft.marker = off_print(instrument.marker, off, random);
-    shaft.blotches = blood_of(kind, shaft.marker, random);
+    const Marker& print = shaft.marker = off_print(instrument.marker, off, random);
+    std::vector<Blotch>& blood = shaft.blotches = blood_over(print, random.uniform(0.7, 1) * kind.beside, random);
+    for (const std::size_t boundary : kind.hidden) bleed_over(print, boundary, kind.of_turn, blood, random);
+    if (kind.partly >= 0) bleed_over(print, static_cast<std::size_t>(kind.partly), 0.5, blood, random);
     JointVector q = random_configurations(rig, 1, random.bits(), steepest_rad)[0][0];
     const cv::Mat tissue = make_tissue(rig.camera.width_px, rig.camera.height_px, static_cast<std::uint64_t>(number));
     Renderer renderer(rig.camera, {shaft}, tissue, {});
@@ -111,12 +106,11 @@ class HiddenBoundaries : public ::testing::Test {
 };
 
 // With the other inner boundary hidden, what is left of an ink that is off is that of a marker that is turned.
-TEST_F(HiddenBoundaries, OfPrintsThatAreOffGiveNoWrongRotation) {
-  for (const Off off : {Off::bands, Off::middle_ink}) EXPECT_EQ(all_kinds(pictures, 1, off).wrong, 0);
-}
-
-TEST_F(HiddenBoundaries, OfPrintsThatAreOffGiveNoneWhileTracked) {
-  for (const Off off : {Off::bands, Off::middle_ink}) EXPECT_EQ(all_kinds((pictures + 3) / 4, 8, off).wrong, 0);
+TEST_F(HiddenBoundaries, OfPrintsThatAreOffGiveNoWrongRotationNorWhileTracked) {
+  for (const Off off : {Off::bands, Off::middle_ink}) {
+    EXPECT_EQ(all_kinds(pictures, 1, off).wrong, 0);
+    EXPECT_EQ(all_kinds((pictures + 3) / 4, 8, off).wrong, 0);
+  }
 }
 
 // The refusals of misprinted markers cost some exact ones.

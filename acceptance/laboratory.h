@@ -11,6 +11,7 @@
 
 #include "lapservo/calibration/camera/camera_calibration.h"
 #include "lapservo/calibration/marker/marker_calibration.h"
+#include "lapservo/calibration/marker/print_adjustment.h"
 #include "lapservo/calibration/recording/joint_recording.h"
 #include "lapservo/calibration/registration/timed_pose.h"
 #include "lapservo/core/angles.h"

@@ -144,19 +144,18 @@ TEST(RigSigmas, OfAPrintAreInPsi) {
 }
 
 // A marker whose diameter is known to 0.5 %, and the places of its edges to so much.
-Rig with_diameter_and_edges(Rig rig, Random& random) {
-  Marker& marker = rig.instruments[0].marker;
-  MarkerSigmas& sigmas = marker.sigmas;
-  sigmas.diameter_m = 5e-3 * marker.diameter_m, sigmas.seam_rad = 0.01, sigmas.gap_rad = 0.01, sigmas.wrap_m = 0.05e-3;
-  marker.diameter_m += *sigmas.diameter_m * random.normal(), marker.seam_rad += *sigmas.seam_rad * random.normal();
-  marker.gap_rad += *sigmas.gap_rad * random.normal(), marker.wrap_m += *sigmas.wrap_m * random.normal();
-  return rig;
-}
-
 TEST(RigSigmas, OfADiameterAndOfAPrintsEdgesAreInThePose) {
   Rig truth = testing::paper_test_rig();
   truth.instruments[0].marker.gap_rad = 0.1;
-  const Row row = tracked(truth, with_diameter_and_edges);
+  const Row row = tracked(truth, [](Rig rig, Random& random) {
+    Marker& marker = rig.instruments[0].marker;
+    MarkerSigmas& sigmas = marker.sigmas;
+    sigmas.diameter_m = 5e-3 * marker.diameter_m, sigmas.seam_rad = 0.01, sigmas.gap_rad = 0.01;
+    sigmas.wrap_m = 0.05e-3;
+    marker.diameter_m += *sigmas.diameter_m * random.normal(), marker.seam_rad += *sigmas.seam_rad * random.normal();
+    marker.gap_rad += *sigmas.gap_rad * random.normal(), marker.wrap_m += *sigmas.wrap_m * random.normal();
+    return rig;
+  });
   row.q.print("diameter to 0.5 %, edges to 10 mrad", row.told, row.frames);
   row.pose.print("the marker's pose", row.told, row.frames);
   EXPECT_GE(row.told, 0.95 * row.frames);

@@ -16,6 +16,7 @@
 #include "bench/tag_bundle.h"
 #include "bench/tag_detectors.h"
 #include "lapservo/core/angles.h"
+#include "lapservo/geometry/rotation.h"
 #include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/tissue.h"
 #include "lapservo/vision/tracker.h"
@@ -47,13 +48,6 @@ std::vector<Scene> scenes(int count, std::uint64_t seed, double steepest_rad) {
   for (const auto& configuration : random_configurations(rig, count, seed, steepest_rad))
     all.push_back({rig, configuration[0], seed * 1000 + all.size()});
   return all;
-}
-
-// How a pose is turned about the true axis.
-double roll_error_rad(const Rigid3& camera_from_marker, const Scene& scene) {
-  const Eigen::Matrix3d off =
-      (scene.camera_from_marker().rotation.conjugate() * camera_from_marker.rotation).toRotationMatrix();
-  return std::atan2(off(1, 0) - off(0, 1), off(0, 0) + off(1, 1));
 }
 
 template <typename Take>
@@ -96,7 +90,7 @@ struct Score {
   void add(const std::optional<Rigid3>& pose, const Scene& scene) {
     ++frames;
     if (!pose) return;
-    error_rad.push_back(roll_error_rad(*pose, scene));
+    error_rad.push_back(roll_between_rad(scene.camera_from_marker().rotation, pose->rotation));
     wrong += std::abs(error_rad.back()) > wrong_rad;
   }
   double found_percent() const { return 100.0 * static_cast<double>(error_rad.size()) / frames; }

@@ -12,8 +12,6 @@ namespace {
 
 // From the BGR frame on, as all others: the conversion to grey is part of the price.
 void apriltag(benchmark::State& state, float decimate) {
-  cv::setNumThreads(1);
-  const auto& frames = moving_frames(scaled_rig(size_argument(state), 1));
   const std::unique_ptr<apriltag_family_t, decltype(&tag36h11_destroy)> family(tag36h11_create(), tag36h11_destroy);
   const std::unique_ptr<apriltag_detector_t, decltype(&apriltag_detector_destroy)> detector(apriltag_detector_create(),
                                                                                             apriltag_detector_destroy);
@@ -21,16 +19,15 @@ void apriltag(benchmark::State& state, float decimate) {
   detector->nthreads = 1;
   detector->quad_decimate = decimate;
   cv::Mat grey;
-  std::size_t index = 0;
   int found = 0;
-  for (auto _ : state) {
-    cv::cvtColor(moving_frame(frames, index++), grey, cv::COLOR_BGR2GRAY);
+  for_moving_frames(state, [&](const cv::Mat& frame) {
+    cv::cvtColor(frame, grey, cv::COLOR_BGR2GRAY);
     image_u8_t image{grey.cols, grey.rows, static_cast<int>(grey.step[0]), grey.data};
     zarray_t* detections = apriltag_detector_detect(detector.get(), &image);
     found += zarray_size(detections);
     apriltag_detections_destroy(detections);
-  }
-  state.counters["found"] = static_cast<double>(found) / static_cast<double>(index);
+  });
+  state.counters["found"] = benchmark::Counter(found, benchmark::Counter::kAvgIterations);
 }
 
 }  // namespace

@@ -7,18 +7,16 @@ namespace lapservo::bench {
 
 // OpenCV's detector with its usual settings, looking for the same tag.
 void aruco(benchmark::State& state) {
-  cv::setNumThreads(1);
-  const auto& frames = moving_frames(scaled_rig(size_argument(state), 1));
   const auto dictionary = cv::aruco::getPredefinedDictionary(cv::aruco::DICT_APRILTAG_36h11);
   const auto parameters = cv::aruco::DetectorParameters::create();
   std::vector<std::vector<cv::Point2f>> corners;
   std::vector<int> ids;
-  std::size_t index = 0, found = 0;
-  for (auto _ : state) {
-    cv::aruco::detectMarkers(moving_frame(frames, index++), dictionary, corners, ids, parameters);
+  std::size_t found = 0;
+  for_moving_frames(state, [&](const cv::Mat& frame) {
+    cv::aruco::detectMarkers(frame, dictionary, corners, ids, parameters);
     found += ids.size();
-  }
-  state.counters["found"] = static_cast<double>(found) / static_cast<double>(index);
+  });
+  state.counters["found"] = benchmark::Counter(static_cast<double>(found), benchmark::Counter::kAvgIterations);
 }
 BENCHMARK(aruco)->Apply(every_size);
 

@@ -32,13 +32,24 @@ const std::vector<cv::Mat>& moving_frames(const Rig& rig);
 /// moving_frames back and forth without end: no jump for a tracker.
 const cv::Mat& moving_frame(const std::vector<cv::Mat>& frames, std::size_t index);
 
-/// The background alone.
-const cv::Mat& empty_frame(const Rig& rig);
-
 /// Arguments of benchmarks: image width and height.
 inline cv::Size size_argument(const benchmark::State& state) {
   return {static_cast<int>(state.range(0)), static_cast<int>(state.range(1))};
 }
+
+/// A benchmark's loop: calls `work` with the next of these frames each time, of one instrument and the arguments' size.
+template <typename Work>
+void for_moving_frames(benchmark::State& state, const Work& work) {
+  cv::setNumThreads(1);
+  const auto& frames = moving_frames(scaled_rig(size_argument(state), 1));
+  std::size_t index = 0;
+  for (auto _ : state) work(moving_frame(frames, index++));
+}
+
+/// The background alone.
+const cv::Mat& empty_frame(const Rig& rig);
+
+/// Sets these arguments.
 void every_size(benchmark::internal::Benchmark* benchmark);
 /// As above, and 1 to 3 instruments as the third argument.
 void every_size_and_number(benchmark::internal::Benchmark* benchmark);

@@ -10,6 +10,7 @@
 #include <opencv2/calib3d.hpp>
 
 #include "lapservo/core/angles.h"
+#include "lapservo/geometry/rotation.h"
 
 namespace lapservo::bench {
 using namespace internal;
@@ -165,11 +166,7 @@ std::optional<Rigid3> refined(Start& start, const Points& points, const Camera& 
   ceres::Solve(options, &problem, &summary);
   if (!summary.IsSolutionUsable() || !(start.shift.at<double>(2) > 0)) return std::nullopt;
   const Eigen::Vector3d by(start.turn.at<double>(0), start.turn.at<double>(1), start.turn.at<double>(2));
-  const double angle_rad = by.norm();
-  Rigid3 pose;
-  if (angle_rad > 0) pose.rotation = Eigen::AngleAxisd(angle_rad, by / angle_rad);
-  pose.translation = {start.shift.at<double>(0), start.shift.at<double>(1), start.shift.at<double>(2)};
-  return pose;
+  return Rigid3{rotation_by(by), {start.shift.at<double>(0), start.shift.at<double>(1), start.shift.at<double>(2)}};
 }
 
 }  // namespace

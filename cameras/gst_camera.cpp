@@ -22,18 +22,12 @@
 namespace lapservo::internal {
 namespace {
 
+template <auto unref>
 struct Unref {
-  void operator()(void* object) const { gst_object_unref(object); }
+  void operator()(auto* object) const { unref(object); }
 };
 template <typename T>
-using Owned = std::unique_ptr<T, Unref>;
-struct UnrefSample {
-  void operator()(GstSample* sample) const { gst_sample_unref(sample); }
-};
-using Sample = std::unique_ptr<GstSample, UnrefSample>;
-struct UnrefMessage {
-  void operator()(GstMessage* message) const { gst_message_unref(message); }
-};
+using Owned = std::unique_ptr<T, Unref<gst_object_unref>>;
 
 // Errors quote whole paragraphs.
 std::string one_line(std::string text) {
@@ -75,41 +69,14 @@ ChromaSite site_of(const GstVideoInfo& info, bool is_jpeg) {
   return packed || info.chroma_site == GST_VIDEO_CHROMA_SITE_UNKNOWN ? ChromaSite::left : ChromaSite::centre;
 }
 
-std::optional<Transfer> transfer_of(const GstVideoInfo& info) {
-  switch (info.colorimetry.transfer) {
-    case GST_VIDEO_TRANSFER_GAMMA10:
-      return Transfer{};
-    case GST_VIDEO_TRANSFER_ARIB_STD_B67:
-      return Transfer{Transfer::Kind::hlg};
-    case GST_VIDEO_TRANSFER_SMPTE2084:
-      return Transfer{Transfer::Kind::pq};
-    default:
-      return std::nullopt;  // as cameras encode light
-  }
-}
-
 YuvColours colours_of(const GstVideoInfo& info) {
   YuvColours colours;
   colours.full_range = info.colorimetry.range == GST_VIDEO_COLOR_RANGE_0_255;
   const bool is_601 = info.colorimetry.matrix == GST_VIDEO_COLOR_MATRIX_BT601;
-  switch (info.colorimetry.matrix) {
-    case GST_VIDEO_COLOR_MATRIX_FCC:
-      colours.matrix = YuvMatrix::fcc;
-      break;
-    case GST_VIDEO_COLOR_MATRIX_BT709:
-      colours.matrix = YuvMatrix::bt709;
-      break;
-    case GST_VIDEO_COLOR_MATRIX_SMPTE240M:
-      colours.matrix = YuvMatrix::smpte240m;
-      break;
-    case GST_VIDEO_COLOR_MATRIX_BT2020:
-      colours.matrix = YuvMatrix::bt2020;
-      break;
-    default:
-      break;
-  }
+  const auto matrix = yuv_matrix_of(static_cast<int>(gst_video_color_matrix_to_iso(info.colorimetry.matrix)));
+  colours.matrix = matrix.value_or(YuvMatrix::bt601);
   colours.chroma = site_of(info, is_601 && colours.full_range);
-  colours.transfer = transfer_of(info);
+  colours.transfer = transfer_of_code(static_cast<int>(gst_video_transfer_function_to_iso(info.colorimetry.transfer)));
   return colours;
 }
 
@@ -172,7 +139,7 @@ class GstCamera : public LiveCamera {
     const Owned<GstBus> bus(gst_element_get_bus(pipeline_.get()));
     const std::lock_guard lock(mutex_);
     constexpr auto last = static_cast<GstMessageType>(GST_MESSAGE_ERROR | GST_MESSAGE_EOS);
-    const std::unique_ptr<GstMessage, UnrefMessage> message(gst_bus_pop_filtered(bus.get(), last));
+    const std::unique_ptr<GstMessage, Unref<gst_message_unref>> message(gst_bus_pop_filtered(bus.get(), last));
     if (message && !ended_) ended_ = end_of(message.get());
     return ended_;
   }
@@ -263,7 +230,8 @@ class GstCamera : public LiveCamera {
   // The next image, in 8-bit BGR into what `place` returns for its size; false when none comes.
   bool take(std::chrono::milliseconds patience, double& stamp_s,
             const std::function<cv::Mat(const cv::Size&)>& place) const {
-    const Sample sample(gst_app_sink_try_pull_sample(app_sink(), std::chrono::nanoseconds(patience).count()));
+    const std::unique_ptr<GstSample, Unref<gst_sample_unref>> sample(
+        gst_app_sink_try_pull_sample(app_sink(), std::chrono::nanoseconds(patience).count()));
     GstVideoInfo info;
     GstVideoFrame frame;
     if (!sample || !gst_video_info_from_caps(&info, gst_sample_get_caps(sample.get())) ||

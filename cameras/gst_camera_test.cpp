@@ -10,7 +10,7 @@
 #include "cameras/camera.h"
 #include "lapservo/crtk/image_decoder.h"
 #include "lapservo/crtk/test_inbox.h"
-#include "lapservo/io/pictures/jpeg_encoding.h"
+#include "lapservo/io/pictures/jpeg_picture.h"
 #include "lapservo/robot/steady_clock.h"
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"

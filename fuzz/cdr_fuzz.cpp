@@ -3,7 +3,7 @@
 #include <span>
 
 #include "fuzz/require_messages.h"
-#include "transports/ros2/cdr_decoder.h"
+#include "transports/ros2/cdr.h"
 
 // Any bytes of a bag are a message that holds no more than they do, or none.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

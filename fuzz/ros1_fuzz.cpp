@@ -6,12 +6,11 @@
 #include "transports/ros1/ros1_decoder.h"
 
 // Any bytes are a message that holds no more than they do, or none.
-namespace {
-using namespace lapservo;
-using namespace lapservo::internal;
-using fuzz::require;
-
-void read(std::span<const std::uint8_t> bytes) {
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace lapservo;
+  using namespace lapservo::internal;
+  using fuzz::require;
+  const std::span bytes(data, size);
   fuzz::require_messages_within([]<typename Message>(const auto& from) { return decode_ros1<Message>(from); }, bytes);
   if (const auto trajectory = decode_ros1<TrajectoryMessage>(bytes))
     require(4 * trajectory->names.size() + 24 * trajectory->points.size() <= bytes.size(), "points are in the bytes");
@@ -19,11 +18,5 @@ void read(std::span<const std::uint8_t> bytes) {
     require(state->state.size() < bytes.size(), "a state is in the bytes");
   if (const auto text = decode_ros1<StringMessage>(bytes))
     require(text->text.size() < bytes.size(), "a text is in the bytes");
-}
-
-}  // namespace
-
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  read({data, size});
   return 0;
 }

@@ -4,6 +4,8 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <type_traits>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -36,17 +38,29 @@ class Bag {
  public:
   virtual ~Bag() = default;
   /// As it was named.
-  virtual const std::string& path() const = 0;
-  virtual const std::vector<BagTopic>& topics() const = 0;
+  const std::string& path() const { return path_; }
+  const std::vector<BagTopic>& topics() const { return topics_; }
   /// Which files beside it are not read and why; empty where there are none.
-  virtual std::string remark() const { return {}; }
+  const std::string& remark() const { return remark_; }
   /// The messages of one of topics(). The bag must outlive it.
   virtual std::unique_ptr<BagMessages> messages(const BagTopic& topic) const = 0;
+
+ protected:
+  explicit Bag(const std::string& path) : path_(path) {}
+
+  std::string path_, remark_;
+  std::vector<BagTopic> topics_;
 };
 
 inline constexpr const char* joint_type = "sensor_msgs/JointState";
 inline constexpr const char* image_type = "sensor_msgs/Image";
 inline constexpr const char* compressed_image_type = "sensor_msgs/CompressedImage";
+
+/// The type of topics that carry such messages.
+template <typename Message>
+constexpr const char* bag_type = std::is_same_v<Message, JointMessage>   ? joint_type
+                                 : std::is_same_v<Message, ImageMessage> ? image_type
+                                                                         : compressed_image_type;
 
 /// The result of `decode.operator()<Message>(bytes)` for a message's bytes.
 template <typename Decode, typename Bytes>

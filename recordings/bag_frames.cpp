@@ -9,7 +9,7 @@
 
 #include "lapservo/core/error.h"
 #include "lapservo/crtk/image_decoder.h"
-#include "lapservo/io/pictures/jpeg_picture.h"
+#include "lapservo/io/pictures/picture_parts.h"
 #include "recordings/bag_topics.h"
 
 namespace lapservo::internal {
@@ -29,7 +29,7 @@ const std::string& BagFrames::why() const {
 std::optional<BagFrames::Picture> BagFrames::read() {
   while (auto message = messages_.next()) {
     if (const auto* compressed = std::get_if<CompressedImageMessage>(&message->message); compressed && !first_)
-      is_jpeg_ = is_jpeg(compressed->data);
+      is_jpeg_ = picture_format(compressed->data) == PictureFormat::jpeg;
     auto* raw = std::get_if<ImageMessage>(&message->message);
     DecodedImage image = raw ? decode(std::move(*raw)) : decode(std::get<CompressedImageMessage>(message->message));
     if (auto* bgr = std::get_if<cv::Mat>(&image)) return Picture{message->time_s, std::move(*bgr)};

@@ -11,15 +11,12 @@ namespace {
 
 constexpr std::size_t max_waiting_bytes = std::size_t{512} << 20;
 
-std::size_t bytes_of(const JointMessage& message) {
-  return 64 * message.names.size();
-}
-template <typename Image>
-std::size_t bytes_of(const Image& message) {
-  return message.data.size();
-}
 std::size_t bytes_of(const BagRecorder::Message& message) {
-  return std::visit([](const auto& one) { return bytes_of(one); }, message);
+  const auto bytes = [](const auto& one) {
+    if constexpr (requires { one.data; }) return one.data.size();
+    if constexpr (requires { one.names; }) return 64 * one.names.size();
+  };
+  return std::visit(bytes, message);
 }
 
 }  // namespace

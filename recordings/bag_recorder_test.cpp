@@ -13,7 +13,7 @@
 #include "lapservo/testing/temporary_folder.h"
 #include "recordings/open_bag.h"
 #include "recordings/ros2_bag_writer.h"
-#include "transports/ros2/cdr_encoder.h"
+#include "transports/ros2/cdr.h"
 
 namespace lapservo::internal {
 namespace bag_recorder_test {
@@ -55,11 +55,8 @@ TEST(CdrEncoder, IsReadByFastCdr) {
   EXPECT_EQ(positions, (std::vector<double>{0.5, -1.5, 0.25}));
   EXPECT_TRUE(velocities.empty() && efforts.empty());
   EXPECT_EQ(lapservo::testing::bytes_of(cdr), bytes.size());
-}
-
-TEST(CdrEncoder, RoundsStampsUpToTheNextSecond) {
-  const auto bytes = encode_cdr(joints_at(2 - 1e-10));
-  EXPECT_EQ((std::vector<std::uint8_t>(bytes.begin() + 4, bytes.begin() + 12)),
+  const auto rounded = encode_cdr(joints_at(2 - 1e-10));  // up to the next second
+  EXPECT_EQ((std::vector<std::uint8_t>(rounded.begin() + 4, rounded.begin() + 12)),
             (std::vector<std::uint8_t>{2, 0, 0, 0, 0, 0, 0, 0}));
 }
 
@@ -90,20 +87,15 @@ TEST(Ros2BagWriter, WritesWhatIsReadAgain) {
   }
 }
 
-TEST(Ros2BagWriter, NeverGoesOverSomething) {
+TEST(BagRecorder, NeverGoesOverSomethingAndLeavesNothingOfNothing) {
   const lapservo::testing::TemporaryFolder folder;
   lapservo::testing::write_file(folder / "mine.txt", "mine");
   const std::string path = folder.path().string();
   EXPECT_EQ(input_error([&] { Ros2BagWriter{path}; }), path + ": exists, expected the name of a new folder");
   EXPECT_TRUE(std::filesystem::exists(folder / "mine.txt"));
-}
-
-TEST(BagRecorder, LeavesNothingOfNothing) {
-  const lapservo::testing::TemporaryFolder folder;
   { const BagRecorder ended_early(folder / "bag"); }
   EXPECT_FALSE(std::filesystem::exists(folder / "bag"));
-  BagRecorder recorder(folder / "bag");
-  recorder.finish();
+  BagRecorder(folder / "bag").finish();
 }
 
 TEST(BagRecorder, RecordsFromSeveralThreads) {

@@ -13,14 +13,8 @@ namespace {
 
 class ListedBag : public Bag {
  public:
-  explicit ListedBag(std::vector<BagTopic> topics) : topics_(std::move(topics)) {}
-  const std::string& path() const override { return path_; }
-  const std::vector<BagTopic>& topics() const override { return topics_; }
+  explicit ListedBag(std::vector<BagTopic> topics) : Bag("run.bag") { topics_ = std::move(topics); }
   std::unique_ptr<BagMessages> messages(const BagTopic&) const override { throw std::logic_error("not requested"); }
-
- private:
-  std::string path_ = "run.bag";
-  std::vector<BagTopic> topics_;
 };
 
 std::string image_topic(const std::vector<BagTopic>& topics, const std::string& name = "") {

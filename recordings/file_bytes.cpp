@@ -9,11 +9,8 @@
 namespace lapservo::internal {
 
 FileBytes::FileBytes(const std::string& path, const std::string& expected)
-    : path_(path), file_(new int(::open(path.c_str(), O_RDONLY | O_CLOEXEC)), [](const int* file) {
-        if (*file >= 0) ::close(*file);
-        delete file;
-      }) {
-  const off_t size = *file_ >= 0 ? ::lseek(*file_, 0, SEEK_END) : -1;
+    : path_(path), file_(::open(path.c_str(), O_RDONLY | O_CLOEXEC)) {
+  const off_t size = file_.is_open() ? ::lseek(file_.number(), 0, SEEK_END) : -1;
   if (size < 0) throw InputError(path, "can't be read, expected " + expected);
   if (size == 0) throw InputError(path, "is empty, expected " + expected);
   size_ = static_cast<std::uint64_t>(size);
@@ -21,7 +18,7 @@ FileBytes::FileBytes(const std::string& path, const std::string& expected)
 
 bool FileBytes::read(std::uint64_t at, std::span<std::uint8_t> to) {
   while (!to.empty()) {
-    const ssize_t count = ::pread(*file_, to.data(), to.size(), static_cast<off_t>(at));
+    const ssize_t count = ::pread(file_.number(), to.data(), to.size(), static_cast<off_t>(at));
     if (count <= 0) return false;
     at += static_cast<std::uint64_t>(count);
     to = to.subspan(static_cast<std::size_t>(count));

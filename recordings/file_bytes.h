@@ -3,11 +3,12 @@
 #include <bit>
 #include <cstdint>
 #include <cstring>
-#include <memory>
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
+
+#include "lapservo/core/file_descriptor.h"
 
 namespace lapservo::internal {
 
@@ -50,7 +51,7 @@ class FileBytes {
   bool read(std::uint64_t at, std::span<std::uint8_t> to);
 
   std::string path_;
-  std::shared_ptr<const int> file_;
+  FileDescriptor file_;
   std::uint64_t size_ = 0, window_at_ = 0;
   Bytes window_;
 };

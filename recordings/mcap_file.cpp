@@ -206,11 +206,6 @@ FileBytes opened(const std::string& path) {
   return FileBytes(path, "an MCAP recording");
 }
 
-void count(Ros2FileTopic& topic, std::uint64_t messages, std::uint64_t first_ns, std::uint64_t last_ns) {
-  topic.messages += messages;
-  topic.first_ns = std::min(topic.first_ns, first_ns), topic.last_ns = std::max(topic.last_ns, last_ns);
-}
-
 // The summary of a file that was finished.
 class Summary {
  public:
@@ -280,7 +275,7 @@ class Summary {
       const bool is_known = topic != contents_.channels.topics.end() && !topic->second.type.empty();
       if (!counted || !is_known) return false;  // schemas need not be repeated
       const auto times = times_.try_emplace(*channel, *first_ns, *last_ns).first->second;
-      if (*counted > 0) count(topic->second, *counted, times.first, times.second);
+      if (*counted > 0) topic->second.count(*counted, times.first, times.second);
     }
     return true;
   }
@@ -296,34 +291,32 @@ Contents found_by_reading(FileBytes& file) {
   contents.all = {magic.size(), file.size(), 0, {}};
   McapMessages messages(file, magic.size(), file.size(), true);
   std::map<std::uint16_t, Ros2FileTopic> counted;
-  while (const auto message = messages.next()) count(counted[message->channel], 1, message->time_ns, message->time_ns);
+  while (const auto message = messages.next()) counted[message->channel].count(1, message->time_ns, message->time_ns);
   contents.channels = messages.channels();
   for (auto& [number, topic] : contents.channels.topics)
-    count(topic, counted[number].messages, counted[number].first_ns, counted[number].last_ns);
+    topic.count(counted[number].messages, counted[number].first_ns, counted[number].last_ns);
   if (!messages.is_finished()) contents.ends_early_at = messages.ends_early_at().value_or(file.size());
   return contents;
 }
 
 // The messages of chunks in the order of their times. Chunks may overlap in time, so each is read when a message of it
 // may be the next.
-class IndexedMessages : public Ros2FileMessages {
+class IndexedMessages {
  public:
   IndexedMessages(const std::string& path, std::vector<Part> chunks, ChannelNumbers channels)
       : file_(opened(path)), chunks_(std::move(chunks)), channels_(std::move(channels)) {}
 
-  bool next() override {
+  std::optional<Ros2RawMessage> next() {
     constexpr std::size_t most = std::size_t{128} << 20;  // of bytes that wait, whatever their order is
     while (next_ < chunks_.size() &&
            (ahead_.empty() || (bytes_ahead_ < most && ahead_.begin()->first >= chunks_[next_].first_ns)))
       read(chunks_[next_++]);
-    if (ahead_.empty()) return false;
+    if (ahead_.empty()) return std::nullopt;
     auto first = ahead_.extract(ahead_.begin());
-    recorded_ns_ = first.key(), content_ = std::move(first.mapped());
+    content_ = std::move(first.mapped());
     bytes_ahead_ -= content_.size();
-    return true;
+    return Ros2RawMessage{first.key(), content_};
   }
-  std::span<const std::uint8_t> bytes() override { return content_; }
-  std::uint64_t recorded_ns() const override { return recorded_ns_; }
 
  private:
   void read(const Part& chunk) {
@@ -341,30 +334,31 @@ class IndexedMessages : public Ros2FileMessages {
   ChannelNumbers channels_;
   std::size_t next_ = 0, bytes_ahead_ = 0;
   std::multimap<std::uint64_t, Bytes> ahead_;  // by their times
-  std::uint64_t recorded_ns_ = 0;
   Bytes content_;
 };
 
 // In the order in which they stand in the file.
-class MessagesInPlace : public Ros2FileMessages {
+class MessagesInPlace {
  public:
   MessagesInPlace(const std::string& path, const Part& part, ChannelNumbers channels, bool may_end_early)
       : file_(opened(path)), messages_(file_, part.begin, part.end, may_end_early), channels_(std::move(channels)) {}
 
-  bool next() override {
+  std::optional<Ros2RawMessage> next() {
     while (const auto message = messages_.next())
-      if (channels_.contains(message->channel)) return recorded_ns_ = message->time_ns, true;
-    return false;
+      if (channels_.contains(message->channel)) return Ros2RawMessage{message->time_ns, messages_.data()};
+    return std::nullopt;
   }
-  std::span<const std::uint8_t> bytes() override { return messages_.data(); }
-  std::uint64_t recorded_ns() const override { return recorded_ns_; }
 
  private:
   FileBytes file_;
   McapMessages messages_;
   ChannelNumbers channels_;
-  std::uint64_t recorded_ns_ = 0;
 };
+
+template <typename Messages>
+Ros2FileMessages all_of(std::shared_ptr<Messages> messages) {
+  return [messages = std::move(messages)] { return messages->next(); };
+}
 
 class McapFile : public Ros2File {
  public:
@@ -381,27 +375,24 @@ class McapFile : public Ros2File {
     for (const auto& [number, topic] : contents_.channels.topics) topics_.push_back(topic);
   }
 
-  const std::vector<Ros2FileTopic>& topics() const override { return topics_; }
-  std::string remark() const override { return remark_; }
-  std::unique_ptr<Ros2FileMessages> messages(const std::string& name, const std::string& type) const override {
+  Ros2FileMessages messages(const std::string& name, const std::string& type) const override {
     ChannelNumbers wanted;
     for (const auto& [number, topic] : contents_.channels.topics)
       if (topic.name == name && topic.type == type) wanted.insert(number);
     if (contents_.chunks.empty())
-      return std::make_unique<MessagesInPlace>(path_, contents_.all, std::move(wanted),
-                                               contents_.ends_early_at.has_value());
+      return all_of(std::make_shared<MessagesInPlace>(path_, contents_.all, std::move(wanted),
+                                                      contents_.ends_early_at.has_value()));
     std::vector<Part> chunks;
     std::ranges::copy_if(contents_.chunks, std::back_inserter(chunks), [&](const Part& chunk) {
       const auto has = [&](std::uint16_t number) { return chunk.channels.contains(number); };
       return chunk.channels.empty() || std::ranges::any_of(wanted, has);
     });
-    return std::make_unique<IndexedMessages>(path_, std::move(chunks), std::move(wanted));
+    return all_of(std::make_shared<IndexedMessages>(path_, std::move(chunks), std::move(wanted)));
   }
 
  private:
-  std::string path_, remark_;
+  std::string path_;
   Contents contents_;
-  std::vector<Ros2FileTopic> topics_;
 };
 
 }  // namespace

@@ -43,8 +43,8 @@ struct Raw {
 std::vector<Raw> read_all(const Ros2File& file, const std::string& topic) {
   std::vector<Raw> all;
   const auto from = file.messages(topic, "std_msgs/msg/String");
-  while (from->next()) all.push_back({from->recorded_ns(), {from->bytes().begin(), from->bytes().end()}});
-  EXPECT_FALSE(from->next());
+  while (const auto raw = from()) all.push_back({raw->recorded_ns, {raw->bytes.begin(), raw->bytes.end()}});
+  EXPECT_FALSE(from());
   return all;
 }
 
@@ -206,28 +206,19 @@ TEST(McapFile, ThatIsDamagedIsReadOrRefused) {
 TEST(McapFile, SeveralOfAFolderAreOneBag) {
   const testing::TemporaryFolder folder;
   const auto messages = entries(9);
-  const auto count = [](const Bag& bag) {
-    std::size_t all = 0;
-    for (const BagTopic& topic : bag.topics()) all += topic.messages;
-    return all;
-  };
   testing::write_mcap(folder / "bag_9.mcap", {messages.begin(), messages.begin() + 4});
   testing::write_mcap(folder / "bag_10.mcap", {messages.begin() + 4, messages.end()}, {"zstd", 3, true, true});
   testing::write_file(folder / "bag_11.mcap", "");
   ASSERT_TRUE(is_bag(folder.path()));
-  EXPECT_EQ(count(*open_bag(folder.path())), 9u);
-  EXPECT_EQ(open_bag(folder.path())->remark(), "has no metadata.yaml: the times of its files decide their order");
   const auto bag = open_bag(folder.path());
+  std::size_t count = 0;
   for (const BagTopic& topic : bag->topics()) {
+    count += topic.messages;
     double last_s = 0;
     for (const auto from = bag->messages(topic); from->next(); last_s = from->recorded_s())
       EXPECT_GT(from->recorded_s(), last_s);
   }
-  testing::write_ros2_metadata(folder.path(), {"bag_9.mcap", "bag_10.mcap"}, "mcap");
-  EXPECT_EQ(count(*open_bag(folder.path())), 9u);
-  EXPECT_NE(open_bag(folder.path())->remark().find("does not list bag_11.mcap"), std::string::npos);
-
-  std::filesystem::remove(folder / "metadata.yaml");
+  EXPECT_EQ(count, 9u);
   testing::write_ros2_bag(folder / "bag_12.db3", messages);
   EXPECT_NE(input_error([&] { open_bag(folder.path()); }).find("files of several kinds"), std::string::npos);
 }

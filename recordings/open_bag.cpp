@@ -6,7 +6,6 @@
 #include "lapservo/core/error.h"
 #include "recordings/bag_endings.h"
 #ifdef LAPSERVO_BAGS
-#include "recordings/ros_bags.h"
 #include "recordings/session.h"
 #endif
 

@@ -13,7 +13,7 @@
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
 #include "recordings/test_bags.h"
-#include "transports/ros2/cdr_decoder.h"
+#include "transports/ros2/cdr.h"
 
 namespace lapservo::internal {
 namespace open_bag_test {

@@ -17,9 +17,9 @@
 
 namespace lapservo::internal {
 
-/// An arm that another program moves and its camera, as a bag has them, for run(). Times: seconds since the stamp of
-/// the first image.
-class ReplayedRun {
+/// An arm that another program moves and its camera, as a bag has them, for run(), which gets it as its clock, its arm
+/// and its camera. Times: seconds since the stamp of the first image.
+class ReplayedRun : public Clock, public Robot, public ImageStream {
  public:
   /// `images`: the topic of the frames; nullptr where they have the times of the recorder's clock. `joint_topic`: see
   /// bag_topics.h. `instrument`: with joints. `wrist`: those of its tool, by the clock of the arm, where they are
@@ -28,63 +28,35 @@ class ReplayedRun {
               const std::string& joint_topic, const Instrument& instrument, std::optional<JointRecording> wrist);
 
   /// Begins where joints and images do, and passes while somebody sleeps.
-  Clock& clock() { return clock_; }
+  double now_s() const override { return now_s_; }
+  void sleep_until(double time_s) override { now_s_ = std::max(now_s_, time_s); }
   /// Enabled while the bag has joint states, deaf to setpoints.
-  Robot& arm() { return arm_; }
+  JointState state() override;
+  std::vector<JointReading> readings() override;
+  void send(const JointPath&) override {}
+  bool is_simulated() const override { return true; }  // nothing moves
   /// Each image at the time of its stamp.
-  ImageStream& images() { return images_; }
+  std::optional<StampedImage> newest() override;
 
   double duration_s() const { return duration_s_; }
   std::optional<int> image_count() const { return frames_->frame_count(); }
-  int images_given() const { return images_.count; }
-  bool ended() const { return !images_.next; }
+  int images_given() const { return images_given_; }
+  bool ended() const { return !next_frame_; }
   /// By how much the arm's clock is ahead of the camera's; its joints are shifted by that.
-  double arm_clock_lead_s() const { return joints_.lead_s; }
+  double arm_clock_lead_s() const { return lead_s_; }
   std::string complaint() const { return frames_->complaint(); }
-  std::string joint_remark() const { return joints_.recording.remark(); }
+  std::string joint_remark() const { return joints_.remark(); }
 
  private:
-  struct RecordedClock : Clock {
-    explicit RecordedClock(double begin_s) : now(begin_s) {}
-    double now_s() const override { return now; }
-    void sleep_until(double time_s) override { now = std::max(now, time_s); }
-    double now;
-  };
-  struct ShiftedJoints {
-    JointRecording recording;
-    double lead_s = 0;
-  };
-  struct RecordedArm : Robot {
-    RecordedArm(const ShiftedJoints& joints, const Instrument& instrument, std::optional<JointRecording> of_wrist,
-                const Clock& of_run);
-    std::vector<JointReading> readings() override;
-    JointState state() override;
-    void send(const JointPath&) override {}
-    bool is_simulated() const override { return true; }  // nothing moves
-    const Clock& clock;
-    std::vector<JointReading> all;
-    std::size_t next = 0;
-    std::optional<JointRecording> wrist;  // by the arm's clock, which is ahead
-    std::size_t wrist_joints;
-    double lead_s;
-  };
-  struct RecordedImages : ImageStream {
-    RecordedImages(FrameSource& of_bag, const Clock& of_run) : frames(of_bag), clock(of_run), next(of_bag.next()) {}
-    std::optional<StampedImage> newest() override;
-    FrameSource& frames;
-    const Clock& clock;
-    std::optional<Frame> next;
-    int count = 0;
-  };
-  static ShiftedJoints joints_of_bag(const Bag& bag, const BagTopic* images, double begin_s, const std::string& topic,
-                                     const std::string& arm, const Joints& joints);
-
   std::unique_ptr<FrameSource> frames_;
-  ShiftedJoints joints_;
-  double duration_s_ = 0;
-  RecordedClock clock_;
-  RecordedArm arm_;
-  RecordedImages images_;
+  std::optional<Frame> next_frame_;
+  int images_given_ = 0;
+  JointRecording joints_;
+  std::vector<JointReading> all_readings_;
+  std::size_t next_reading_ = 0;
+  std::optional<JointRecording> wrist_;  // by the arm's clock, which is ahead
+  std::size_t wrist_joints_;
+  double now_s_ = 0, duration_s_ = 0, lead_s_ = 0;
 };
 
 }  // namespace lapservo::internal

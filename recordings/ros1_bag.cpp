@@ -8,7 +8,7 @@
 #include "lapservo/core/error.h"
 #include "recordings/chunk_compression.h"
 #include "recordings/file_bytes.h"
-#include "recordings/ros_bags.h"
+#include "recordings/open_bag.h"
 #include "transports/ros1/ros1_decoder.h"
 
 namespace lapservo::internal {
@@ -160,7 +160,7 @@ class Ros1Messages : public BagMessages {
 
 class Ros1Bag : public Bag {
  public:
-  explicit Ros1Bag(const std::string& path) : path_(path) {
+  explicit Ros1Bag(const std::string& path) : Bag(path) {
     RecordFile file(path);
     const auto begin = file.bytes(0, std::min<std::uint64_t>(file.size(), magic.size()));
     if (!std::equal(begin.begin(), begin.end(), magic.begin(), magic.end()))
@@ -169,8 +169,6 @@ class Ros1Bag : public Bag {
     list_topics();
   }
 
-  const std::string& path() const override { return path_; }
-  const std::vector<BagTopic>& topics() const override { return topics_; }
   std::unique_ptr<BagMessages> messages(const BagTopic& topic) const override {
     const auto wanted = connections_.at({topic.name, topic.type});
     std::vector<std::uint64_t> chunks;
@@ -239,8 +237,6 @@ class Ros1Bag : public Bag {
     }
   }
 
-  std::string path_;
-  std::vector<BagTopic> topics_;
   std::map<std::pair<std::string, std::string>, std::vector<std::uint32_t>> connections_;  // by topic and type
   std::vector<Chunk> chunks_;
 };

@@ -9,9 +9,9 @@
 
 #include "lapservo/core/error.h"
 #include "recordings/bag_endings.h"
+#include "recordings/open_bag.h"
 #include "recordings/ros2_file.h"
-#include "recordings/ros_bags.h"
-#include "transports/ros2/cdr_decoder.h"
+#include "transports/ros2/cdr.h"
 
 namespace lapservo::internal {
 namespace {
@@ -45,17 +45,18 @@ class Ros2Messages : public BagMessages {
   }
 
   std::optional<BagMessage> next() override {
-    while (!messages_ || !messages_->next()) {
-      messages_.reset();
+    std::optional<Ros2RawMessage> raw;
+    while (!messages_ || !(raw = messages_())) {
+      messages_ = nullptr;
       if (next_ == from_.size()) return std::nullopt;
       messages_ = from_[next_].file->messages(topic_.name, from_[next_].type);
       ++next_;
     }
+    recorded_ns_ = raw->recorded_ns;
     return decode_bag_message(
-        topic_.type, []<typename Message>(const auto& bytes) { return decode_cdr<Message>(bytes); },
-        messages_->bytes());
+        topic_.type, []<typename Message>(const auto& bytes) { return decode_cdr<Message>(bytes); }, raw->bytes);
   }
-  double recorded_s() const override { return 1e-9 * static_cast<double>(messages_->recorded_ns()); }
+  double recorded_s() const override { return 1e-9 * static_cast<double>(recorded_ns_); }
 
  private:
   struct From {
@@ -67,28 +68,26 @@ class Ros2Messages : public BagMessages {
   BagTopic topic_;
   std::vector<From> from_;
   std::size_t next_ = 0;
-  std::unique_ptr<Ros2FileMessages> messages_;
+  Ros2FileMessages messages_;
+  std::uint64_t recorded_ns_ = 0;
 };
 
 class Ros2Bag : public Bag {
  public:
-  explicit Ros2Bag(const std::string& path) : path_(path) {
+  explicit Ros2Bag(const std::string& path) : Bag(path) {
     std::error_code error;
     const Ros2BagFiles files = fs::is_directory(path, error) ? files_of_ros2_bag(path) : Ros2BagFiles{{path}, {}, {}};
-    std::vector<std::string> remarks;
-    if (!files.remark.empty()) remarks.push_back(files.remark);
+    std::vector<std::string> remarks{files.remark};
     for (const fs::path& file : files.files) {
       parts_.push_back({file, is_mcap(file) ? open_mcap_file(file) : open_db3_file(file)});
-      if (std::string remark = parts_.back().file->remark(); !remark.empty()) remarks.push_back(std::move(remark));
+      remarks.push_back(parts_.back().file->remark());
     }
+    std::erase(remarks, "");
     by_time_ = files.is_unordered;
     remark_ = fmt::format("{}", fmt::join(remarks, "; "));
     list_topics();
   }
 
-  const std::string& path() const override { return path_; }
-  const std::vector<BagTopic>& topics() const override { return topics_; }
-  std::string remark() const override { return remark_; }
   std::unique_ptr<BagMessages> messages(const BagTopic& topic) const override {
     return std::make_unique<Ros2Messages>(parts_, by_time_, topic);
   }
@@ -97,12 +96,8 @@ class Ros2Bag : public Bag {
   void list_topics() {
     std::map<std::pair<std::string, std::string>, Ros2FileTopic> counts;
     for (const Part& part : parts_)
-      for (const Ros2FileTopic& topic : part.file->topics()) {
-        Ros2FileTopic& counted = counts[{topic.name, type_as_in_ros1(topic.type)}];
-        counted.messages += topic.messages;
-        counted.first_ns = std::min(counted.first_ns, topic.first_ns);
-        counted.last_ns = std::max(counted.last_ns, topic.last_ns);
-      }
+      for (const Ros2FileTopic& topic : part.file->topics())
+        counts[{topic.name, type_as_in_ros1(topic.type)}].count(topic.messages, topic.first_ns, topic.last_ns);
     for (const auto& [names, counted] : counts)
       topics_.push_back({names.first, names.second, counted.messages,
                          counted.messages > 0
@@ -110,10 +105,8 @@ class Ros2Bag : public Bag {
                              : 0});
   }
 
-  std::string path_, remark_;
   bool by_time_ = false;
   std::vector<Part> parts_;
-  std::vector<BagTopic> topics_;
 };
 
 }  // namespace

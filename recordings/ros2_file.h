@@ -1,9 +1,12 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -16,29 +19,35 @@ struct Ros2FileTopic {
   std::string format;      ///< how its messages are encoded: cdr
   std::uint64_t messages = 0;
   std::uint64_t first_ns = std::numeric_limits<std::uint64_t>::max(), last_ns = 0;  ///< about
+
+  void count(std::uint64_t more, std::uint64_t of_first_ns, std::uint64_t of_last_ns) {
+    messages += more;
+    first_ns = std::min(first_ns, of_first_ns), last_ns = std::max(last_ns, of_last_ns);
+  }
 };
 
-/// The messages of one topic as they stand in a file, one after the other.
-class Ros2FileMessages {
- public:
-  virtual ~Ros2FileMessages() = default;
-  /// False behind the last one. Throws InputError where the file is damaged.
-  virtual bool next() = 0;
-  /// Until next().
-  virtual std::span<const std::uint8_t> bytes() = 0;
-  virtual std::uint64_t recorded_ns() const = 0;
+struct Ros2RawMessage {
+  std::uint64_t recorded_ns = 0;
+  std::span<const std::uint8_t> bytes;  ///< until the next one
 };
+/// The messages of one topic as they stand in a file, one after the other; nullopt behind the last one. Throws
+/// InputError where the file is damaged.
+using Ros2FileMessages = std::function<std::optional<Ros2RawMessage>()>;
 
 /// The port to one file of a ROS 2 bag, of any storage.
 class Ros2File {
  public:
   virtual ~Ros2File() = default;
   /// One or several of a name and type.
-  virtual const std::vector<Ros2FileTopic>& topics() const = 0;
+  const std::vector<Ros2FileTopic>& topics() const { return topics_; }
   /// Where it is not whole; empty where it is.
-  virtual std::string remark() const { return {}; }
+  const std::string& remark() const { return remark_; }
   /// The messages of all topics of that name and type.
-  virtual std::unique_ptr<Ros2FileMessages> messages(const std::string& name, const std::string& type) const = 0;
+  virtual Ros2FileMessages messages(const std::string& name, const std::string& type) const = 0;
+
+ protected:
+  std::string remark_;
+  std::vector<Ros2FileTopic> topics_;
 };
 
 /// Throw InputError for what is no such file.

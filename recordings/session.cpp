@@ -197,17 +197,19 @@ std::string bag_of_session(const std::string& folder) {
   return bag.empty() ? std::string() : beside(folder, bag).string();
 }
 
-Session::Session(const std::string& folder, const std::string& stream, const VideoReading& reading) {
+SessionVideo open_session(const std::string& folder, const std::string& stream, const VideoReading& reading) {
+  SessionVideo session;
   std::vector<Part> parts;
   const json found = stream_of(folder, stream);
   for (const json& video : list_in(found, "videos")) {
     const fs::path file = beside(folder, text_in(video, "file"));
     Part part = read_sidecar(fs::path(file).replace_extension(".json"));
     part.video = file.string();
-    layout_ = part.layout == "LR" || part.layout == "RL" ? part.layout : std::string();
+    session.layout = part.layout == "LR" || part.layout == "RL" ? part.layout : std::string();
     parts.push_back(std::move(part));
   }
-  frames_ = std::make_unique<SessionFrames>(std::move(parts), reading);
+  session.frames = std::make_unique<SessionFrames>(std::move(parts), reading);
+  return session;
 }
 
 }  // namespace lapservo::internal

@@ -2,7 +2,6 @@
 
 #include <memory>
 #include <string>
-#include <utility>
 
 #include "lapservo/io/frame_source.h"
 
@@ -15,21 +14,15 @@ bool is_session(const std::string& path);
 /// Its bag; empty where it has none.
 std::string bag_of_session(const std::string& folder);
 
+struct SessionVideo {
+  std::unique_ptr<FrameSource> frames;
+  std::string layout;  ///< "LR" or "RL" where both eyes are side by side; else empty
+};
+
 /// The frames of a session's video stream, by the realtime clock of the computer that recorded it, as dvrk_data's own
 /// tools take it from what each frame's record has: the source's time, the middle between those of the left and the
-/// right one, either of them, or the time of arrival at the recorder.
-class Session {
- public:
-  /// `stream`: its name; empty: the only one. Throws InputError where none or several remain, and for damaged files.
-  Session(const std::string& folder, const std::string& stream, const VideoReading& reading);
-
-  /// "LR" or "RL" where both eyes are side by side; else empty.
-  const std::string& layout() const { return layout_; }
-  std::unique_ptr<FrameSource> frames() { return std::move(frames_); }
-
- private:
-  std::string layout_;
-  std::unique_ptr<FrameSource> frames_;
-};
+/// right one, either of them, or the time of arrival at the recorder. `stream`: its name; empty: the only one. Throws
+/// InputError where none or several remain, and for damaged files.
+SessionVideo open_session(const std::string& folder, const std::string& stream, const VideoReading& reading);
 
 }  // namespace lapservo::internal

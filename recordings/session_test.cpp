@@ -83,9 +83,9 @@ TEST(Session, HasTheFramesOfItsVideosByTheirRecords) {
   folder.add("stereo_001", 4, 4, "RL");
   folder.finish();
   ASSERT_TRUE(is_session(folder.path().string()));
-  Session session(folder.path().string(), "", {});
-  EXPECT_EQ(session.layout(), "RL");
-  const auto frames = session.frames();
+  const auto session = open_session(folder.path().string(), "", {});
+  EXPECT_EQ(session.layout, "RL");
+  const auto& frames = session.frames;
   EXPECT_EQ(frames->first_stamp_s(), 1e-9 * begin_ns);
   EXPECT_EQ(frames->frame_count(), 9);
   EXPECT_EQ(times_of(*frames).size(), 9u);
@@ -107,9 +107,9 @@ TEST(Session, TakesTheTimesInTheDocumentedOrder) {
     SessionFolder folder;
     folder.add("stereo", 3, 3, "undefined", times);
     folder.finish();
-    Session session(folder.path().string(), "stereo", {});
-    EXPECT_EQ(session.layout(), "");
-    const auto frames = session.frames();
+    const auto session = open_session(folder.path().string(), "stereo", {});
+    EXPECT_EQ(session.layout, "");
+    const auto& frames = session.frames;
     EXPECT_EQ(frames->first_stamp_s(), 1e-9 * begin_ns) << times(begin_ns);
     EXPECT_EQ(times_of(*frames).size(), 3u);
   }
@@ -119,7 +119,7 @@ TEST(Session, SaysWhereVideoAndRecordsDoNotGoTogether) {
   SessionFolder folder;
   folder.add("stereo", 5, 3, "LR");
   folder.finish();
-  const auto frames = Session(folder.path().string(), "", {}).frames();
+  const auto frames = open_session(folder.path().string(), "", {}).frames;
   EXPECT_EQ(times_of(*frames).size(), 3u);
   EXPECT_EQ(frames->complaint(), "stereo.mp4 has 5 frames and 3 times: they may not belong together");
 }
@@ -148,12 +148,12 @@ TEST(Session, ThatIsDamagedIsReadOrRefused) {
       std::string text = whole;
       text[below(text.size())] = static_cast<char>("0[]{}\":,n-\x80"[below(11)]);
       testing::write_file(folder.path() / name, text);
-      const std::string error = input_error([&] { Session(folder.path().string(), "", {}); });
+      const std::string error = input_error([&] { open_session(folder.path().string(), "", {}); });
       EXPECT_EQ(error.find('\n'), std::string::npos) << error;
     }
     testing::write_file(folder.path() / name, whole);
   }
-  const std::string none = input_error([&] { Session(folder.path().string(), "room", {}); });
+  const std::string none = input_error([&] { open_session(folder.path().string(), "room", {}); });
   EXPECT_NE(none.find("has 0 video streams of the name room"), std::string::npos) << none;
 }
 

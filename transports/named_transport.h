@@ -15,7 +15,7 @@
 
 namespace lapservo::internal {
 
-/// The transports of this build, for tests and benchmarks.
+/// The transports of this build.
 inline std::vector<std::string> named_transports() {
   return {
 #ifdef LAPSERVO_ROS2
@@ -27,8 +27,8 @@ inline std::vector<std::string> named_transports() {
   };
 }
 
-/// For tests and benchmarks: "ros1" or "ros2", where they are built with it (LAPSERVO_ROS1, LAPSERVO_ROS2). Throws
-/// std::invalid_argument for others.
+/// "ros1" or "ros2", where they are built with it (LAPSERVO_ROS1, LAPSERVO_ROS2). Throws std::invalid_argument for
+/// others.
 inline std::unique_ptr<Transport> named_transport(const std::string& name, [[maybe_unused]] const std::string& node) {
 #ifdef LAPSERVO_ROS1
   if (name == "ros1") return std::make_unique<Ros1Transport>(node);

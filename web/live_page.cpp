@@ -11,7 +11,7 @@
 #include "lapservo/core/csv.h"
 #include "lapservo/core/joint_vector.h"
 #include "lapservo/io/overlay.h"
-#include "lapservo/io/pictures/jpeg_encoding.h"
+#include "lapservo/io/pictures/jpeg_picture.h"
 #include "lapservo/kinematics/feature_map.h"
 #include "web/page_files.h"
 

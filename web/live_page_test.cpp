@@ -1,8 +1,6 @@
 #include "web/live_page.h"
 
-#include <algorithm>
 #include <chrono>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <thread>
@@ -132,7 +130,6 @@ TEST(LivePage, TellsWhatTheLoopDoes) {
     EXPECT_NE(state.find(part), std::string::npos) << part << " in " << state;
 }
 
-// An image that is old says nothing of now.
 TEST(LivePage, ForgetsWhatOldImagesShowed) {
   Served page;
   PageImage image = image_of(testing::small_test_rig(), 10);
@@ -335,7 +332,6 @@ TEST(LivePage, WhoSaysNothingKeepsNobodyFromTheButtons) {
     }
 }
 
-// Those that have requested something stay, up to the limit.
 TEST(LivePage, NewConnectionsEndNoneThatHasRequested) {
   Served page([](PageConfig& config) { config.limits.connections_per_address = 4, config.limits.head_s = 60; });
   const std::string question = page.question("/state");
@@ -368,38 +364,6 @@ TEST(LivePage, WaitsLongerForTheNextRequestThanForTheFirst) {
   EXPECT_NE(answers.find("HTTP/1.1 200", 1), std::string::npos) << answers;
 }
 
-TEST(LivePage, AThousandConnectionsLeaveTheLoopAlone) {
-  const Rig rig = testing::small_test_rig();
-  Served page;
-  Crowd crowd;
-  std::chrono::steady_clock::duration longest{};
-  const auto take_time = [&longest](const std::function<void()>& call) {
-    const auto begin = std::chrono::steady_clock::now();
-    call();
-    longest = std::max(longest, std::chrono::steady_clock::now() - begin);
-  };
-  try {
-    for (int i = 0; i < 1000; ++i) {
-      crowd.push_back(std::make_unique<RawConnection>(page.port));
-      if (i % 20) continue;
-      PageImage image = image_of(rig, 10);
-      take_time([&] { page.show(std::move(image)); });
-      take_time([&] { page.tell({}, std::to_string(i)); });
-      take_time([&] { page.take_wishes(); });
-    }
-  } catch (const std::runtime_error&) {  // this process may open no more
-  }
-  ASSERT_GT(crowd.size(), 100u);
-  EXPECT_LT(longest, std::chrono::milliseconds(500));
-  EXPECT_EQ(crowd.front()->hear(), "");  // ended: no request in time
-  crowd.clear();
-  // Once they have gone.
-  int status = 0;
-  for (int i = 0; i < 200 && (status = page.get("/state")) != 200; ++i)
-    std::this_thread::sleep_for(std::chrono::milliseconds(50));
-  EXPECT_EQ(status, 200);
-}
-
 TEST(LivePage, SaysWhereItCanNotListen) {
   Served page;
   PageConfig config = config_of_test();
@@ -407,7 +371,6 @@ TEST(LivePage, SaysWhereItCanNotListen) {
   EXPECT_TRUE(testing::input_error([&] { const LivePage second(config); }).starts_with("--web: "));
 }
 
-// Viewers that wait when the run ends keep nobody.
 TEST(LivePage, EndsWhileSomebodyWaits) {
   std::optional<RawConnection> viewer;
   std::chrono::steady_clock::time_point begin;

@@ -543,7 +543,7 @@ class Dvrk : public ::testing::TestWithParam<std::string> {
     const auto found = feature_map(
         {rig_.camera, instrument.marker, judge_->first_camera_from_camera().inverse() * *instrument.camera_from_rcm},
         JointVector::from_vector(q));
-    return found.point ? std::optional(found.point->f) : std::nullopt;
+    return found ? std::optional(found->f) : std::nullopt;
   }
   // Two goals on section V-D's way, as the half-size camera sees it.
   static Eigen::Vector4d goal(int number) {

@@ -1,4 +1,4 @@
-#include "apps/lapservo/cli/program.h"
+#include "apps/lapservo/cli/command.h"
 #include "apps/lapservo/cli/subcommands.h"
 
 int main(int argc, char** argv) {

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/calibration/camera/camera_measurement.h"
-#include "lapservo/calibration/colour/colour_measurement.h"
+#include "lapservo/calibration/colour/colour_calibration.h"
 #include "lapservo/calibration/registration/registration_measurement.h"
 #include "lapservo/testing/scenes.h"
 

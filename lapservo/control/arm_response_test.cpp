@@ -72,7 +72,6 @@ TEST(ArmResponse, FindsFrictionAndLoad) {
   EXPECT_LT(off(response.drive().friction, arm.friction), 0.05);
 }
 
-// A blocked joint changes no estimate.
 TEST(ArmResponse, LearnsNothingFromABlockedJoint) {
   ArmResponse response{Scales{}};
   for (int k = 0; k < 300; ++k) {

@@ -8,27 +8,25 @@
 namespace lapservo::internal {
 
 void BacklashEstimator::follow(const Eigen::Vector4d& q_joint) {
-  for (int i = 0; i < 4; ++i) follow(i, q_joint[i]);
+  for (int i = 0; i < 4; ++i) {
+    Joint& joint = joints_[static_cast<std::size_t>(i)];
+    const double measured = q_joint[i], largest = config_.largest[i];
+    if (!followed_) joint.pressed = false, joint.lowest = joint.highest = measured;
+    if (!(largest > 0)) continue;
+    if (joint.pressed) {
+      for (std::size_t k = 0; k < candidates; ++k) joint.grid[k].backlash.follow(measured, width(i, k));
+      continue;
+    }
+    joint.lowest = std::min(joint.lowest, measured);
+    joint.highest = std::max(joint.highest, measured);
+    const int side = measured - joint.lowest > largest ? 1 : joint.highest - measured > largest ? -1 : 0;
+    if (side == 0) continue;
+    for (Candidate& candidate : joint.grid) candidate.backlash = Backlash(measured, side);
+    joint.pressed = true;
+    joint.since = 0;
+  }
   followed_ = true;
   q_joint_ = q_joint;
-}
-
-void BacklashEstimator::follow(int index, double measured) {
-  Joint& joint = joints_[static_cast<std::size_t>(index)];
-  if (!followed_) joint.pressed = false, joint.lowest = joint.highest = measured;
-  const double largest = config_.largest[index];
-  if (!(largest > 0)) return;
-  if (joint.pressed) {
-    for (std::size_t k = 0; k < candidates; ++k) joint.grid[k].backlash.follow(measured, width(index, k));
-    return;
-  }
-  joint.lowest = std::min(joint.lowest, measured);
-  joint.highest = std::max(joint.highest, measured);
-  const int side = measured - joint.lowest > largest ? 1 : joint.highest - measured > largest ? -1 : 0;
-  if (side == 0) return;
-  for (Candidate& candidate : joint.grid) candidate.backlash = Backlash(measured, side);
-  joint.pressed = true;
-  joint.since = 0;
 }
 
 void BacklashEstimator::add(double time_s, const Eigen::Vector4d& rate, const Eigen::Vector4d& q_image,

@@ -7,7 +7,6 @@
 #include <Eigen/Core>
 
 #include "lapservo/control/controller_config.h"
-#include "lapservo/control/feature_model.h"
 #include "lapservo/robot/backlash.h"
 
 namespace lapservo::internal {
@@ -63,7 +62,6 @@ class BacklashEstimator {
   double width(int joint, std::size_t candidate) const {
     return config_.largest[joint] * static_cast<double>(candidate) / (candidates - 1);
   }
-  void follow(int joint, double measured);
 
   BacklashEstimatorConfig config_;
   Scales scales_;

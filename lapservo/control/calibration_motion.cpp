@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <string>
 
 #include "lapservo/core/angles.h"
 #include "lapservo/core/error.h"

@@ -68,9 +68,8 @@ void check_window(const ImageWindow& window) {
 }
 
 void check_observer(const ObserverConfig& observer) {
-  constexpr double longest_s = DelayEstimator::step_s * (DelayEstimator::candidates - 1);
   const auto check_delay = [](const std::string& field, double delay_s) {
-    require(delay_s >= 0 && delay_s <= longest_s, field, delay_s, "0 to 0.3 seconds");
+    require(delay_s >= 0 && delay_s <= DelayEstimator::longest_s, field, delay_s, "0 to 0.3 seconds");
   };
   if (observer.delay_s) check_delay("delay_s", *observer.delay_s);
   check_delay("observer.initial_delay_s", observer.initial_delay_s);

@@ -22,8 +22,7 @@ auto likeliest(const Grid& grid) {
 
 void DelayEstimator::add(double stamp_s, const Eigen::Vector4d& q_image, const Eigen::Matrix4d& covariance,
                          const JointHistory& history) {
-  constexpr double span_s = step_s * (candidates - 1);
-  if (history.size() == 0 || history.oldest_s() > stamp_s - span_s) return;
+  if (history.size() == 0 || history.oldest_s() > stamp_s - longest_s) return;
   const Eigen::Matrix4d noise = covariance + Eigen::Matrix4d(config_.measured_sigma.cwiseAbs2().asDiagonal());
   const Eigen::Matrix4d information = noise.inverse();
   const double interval_s = weight_ > 0 ? std::max(0.0, stamp_s - last_stamp_s_) : 0.0;
@@ -45,7 +44,7 @@ void DelayEstimator::add(double stamp_s, const Eigen::Vector4d& q_image, const E
       by_model_.block<4, 4>(4 * i, 4 * j) = kept * by_model_.block<4, 4>(4 * i, 4 * j) + information(i, j) * places;
   mean_ += fraction * moved;
   squares_ = kept * squares_ + (1 - fraction) * moved.dot(information * moved);
-  const Eigen::Vector4d rate = (*history.at(stamp_s) - *history.at(stamp_s - span_s)) / span_s;
+  const Eigen::Vector4d rate = (*history.at(stamp_s) - *history.at(stamp_s - longest_s)) / longest_s;
   information_per_s2_ = kept * information_per_s2_ + (1 - fraction) * rate.dot(information * rate);
   weight_ = kept * weight_ + 1;
   since_ += 1;
@@ -86,7 +85,7 @@ std::optional<DelayEstimate> DelayEstimator::estimate() const {
   const double curvature = (left - 2 * centre + right) / (step_s * step_s);
   if (!(curvature > 0)) return std::nullopt;
   const double shift_s = (left - right) / (2 * step_s * curvature);
-  const double delay_s = std::clamp(step_s * static_cast<double>(middle) + shift_s, 0.0, step_s * (candidates - 1));
+  const double delay_s = std::clamp(step_s * static_cast<double>(middle) + shift_s, 0.0, longest_s);
   // A sum of squares grows by 1 at one sigma. A residual that the measured joints do not explain counts as noise that
   // persists over several frames.
   const double misfit = std::max(1.0, lowest->squares / (4 * weight_));

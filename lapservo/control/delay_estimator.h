@@ -25,6 +25,7 @@ class DelayEstimator {
  public:
   static constexpr double step_s = 0.005;
   static constexpr std::size_t candidates = 61;  ///< 0 to 300 ms
+  static constexpr double longest_s = step_s * (candidates - 1);
 
   explicit DelayEstimator(const DelayEstimatorConfig& config = {}) : config_(config) {}
 

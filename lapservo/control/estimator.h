@@ -11,7 +11,6 @@
 #include "lapservo/control/hold_reason.h"
 #include "lapservo/control/image_measurement.h"
 #include "lapservo/control/joint_history.h"
-#include "lapservo/control/offset_observer.h"
 
 namespace lapservo::internal {
 

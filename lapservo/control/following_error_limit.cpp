@@ -15,25 +15,23 @@ void FollowingErrorLimit::update(const MotionState& setpoint, const Eigen::Vecto
   constexpr double known = 0.9, unknown = 0.7, least_lag_s = 0.02;  // an arm lags at least by about this
   drive_ = drive;
   const double lag_or_least_s = std::max(lag_s, least_lag_s);
-  for (int i = 0; i < 4; ++i) {
-    const double times = drive.load_known[static_cast<std::size_t>(i)] ? known : unknown;
-    allowed_[i] = times * lag_or_least_s * limits_.rate[i] + drive.friction[i];
-  }
-  const Eigen::Vector4d lead = setpoint.position - q_joint - drive.load;
-  if (std::exchange(restarted_, false)) beyond_ = lead;
-  for (int i = 0; i < 4; ++i) {
-    const double side = lead[i] > 0 ? 1 : -1, excess = side * lead[i] - allowed_[i];
-    if (excess <= 0) {
-      beyond_[i] = 0;
-    } else if (drive.follows[static_cast<std::size_t>(i)]) {
-      const double v = setpoint.velocity[i];
-      beyond_[i] = lead[i] - lag_s * v - std::copysign(drive.friction[i], v);
-    }
-  }
-  ahead_ = lead - beyond_;
+  const bool restarted = std::exchange(restarted_, false);
   bool at_end = false;
-  for (int i = 0; i < 4; ++i)
-    at_end |= std::abs(ahead_[i]) > nearly * allowed_[i] && !drive.follows[static_cast<std::size_t>(i)];
+  for (int i = 0; i < 4; ++i) {
+    const auto joint = static_cast<std::size_t>(i);
+    const double times = drive.load_known[joint] ? known : unknown;
+    allowed_[i] = times * lag_or_least_s * limits_.rate[i] + drive.friction[i];
+    const double lead = setpoint.position[i] - q_joint[i] - drive.load[i], side = lead > 0 ? 1 : -1;
+    if (restarted) beyond_[i] = lead;
+    if (side * lead - allowed_[i] <= 0) {
+      beyond_[i] = 0;
+    } else if (drive.follows[joint]) {
+      const double v = setpoint.velocity[i];
+      beyond_[i] = lead - lag_s * v - std::copysign(drive.friction[i], v);
+    }
+    ahead_[i] = lead - beyond_[i];
+    at_end |= std::abs(ahead_[i]) > nearly * allowed_[i] && !drive.follows[joint];
+  }
   reached_s_ = at_end ? reached_s_ + interval_s : 0;
 }
 

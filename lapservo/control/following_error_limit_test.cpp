@@ -1,11 +1,8 @@
 #include "lapservo/control/following_error_limit.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
-
-#include "lapservo/core/random.h"
 
 namespace lapservo::internal::following_error_limit_test {
 
@@ -91,23 +88,6 @@ TEST(FollowingErrorLimit, DoesNotTakeALoadForABlockedJoint) {
   }
   EXPECT_LE((q - setpoint.position - sag).maxCoeff(), 0);
   EXPECT_LE(setpoint.velocity.norm(), 1e-3);
-}
-
-TEST(FollowingErrorLimit, StaysWithinTheLimitsWhateverIsWanted) {
-  Random random(3);
-  for (int k = 0; k < 1000; ++k) {
-    Limited limited;
-    MotionState& setpoint = limited.setpoint;
-    DriveState drive;
-    Eigen::Vector4d wanted;
-    for (int i = 0; i < 4; ++i) {
-      setpoint.position[i] = q[i] + random.uniform(-1, 1) * limits.rate[i];
-      setpoint.velocity[i] = random.uniform(-1, 1) * limits.rate[i];
-      drive.velocity[i] = random.uniform(-1, 1) * limits.rate[i];
-      wanted[i] = std::clamp(setpoint.velocity[i] + random.uniform(-1, 1) * change[i], -limits.rate[i], limits.rate[i]);
-    }
-    limited.move(wanted, q, drive);
-  }
 }
 
 }  // namespace lapservo::internal::following_error_limit_test

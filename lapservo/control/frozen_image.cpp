@@ -15,14 +15,13 @@ constexpr double repeated_s = 0.095;  // a camera of 10 images a second in any f
 
 }  // namespace
 
-bool FrozenImage::same_features(const Eigen::Vector4d& features) const {
-  const Eigen::Array4d change = feature_error(features, first_->features).cwiseQuotient(scales_.features).array();
-  return (change.abs() < same).all();
-}
-
 FrozenImage::Verdict FrozenImage::add(const ImageMeasurement& image, const JointHistory& history) {
   const bool same_pixels = image.repetition != Repetition::none;
-  if (!first_ || !(same_pixels || same_features(image.features))) {
+  const auto same_features = [&] {
+    const Eigen::Array4d change = feature_error(image.features, first_->features).cwiseQuotient(scales_.features);
+    return (change.abs() < same).all();
+  };
+  if (!first_ || !(same_pixels || same_features())) {
     first_ = image;
     same_pixels_ = true;
     joints_then_ = joints_at(image, history);

@@ -35,7 +35,6 @@ class FrozenImage {
   static constexpr std::size_t delays = 7;                            ///< 0 to 300 ms
   using Joints = std::array<std::optional<Eigen::Vector4d>, delays>;  ///< where they were, were that the delay
   static Joints joints_at(const ImageMeasurement& image, const JointHistory& history);
-  bool same_features(const Eigen::Vector4d& features) const;
   bool joints_moved(const ImageMeasurement& image, const JointHistory& history) const;
 
   Scales scales_;

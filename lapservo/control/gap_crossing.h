@@ -3,8 +3,7 @@
 #include <Eigen/Core>
 
 #include "lapservo/control/arm_response.h"
-#include "lapservo/control/motion_limits.h"
-#include "lapservo/control/offset_observer.h"
+#include "lapservo/control/estimate.h"
 
 namespace lapservo::internal {
 

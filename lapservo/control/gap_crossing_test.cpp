@@ -90,24 +90,4 @@ TEST(CrossGaps, LeavesAloneWhatHasNoDirection) {
   }
 }
 
-TEST(CrossGaps, StaysWithinRateAndAcceleration) {
-  const JointLimits limits;
-  const Eigen::Vector4d q(0, 1, 0.1, 0);
-  Random random(5);
-  for (int k = 0; k < 1000; ++k) {
-    GapState gap;
-    Eigen::Vector4d v, asked;
-    for (int i = 0; i < 4; ++i) {
-      gap.width[i] = random.uniform(0, limits.rate[i]);
-      gap.shift[i] = random.uniform(-0.5, 0.5) * gap.width[i];
-      v[i] = random.uniform(-1, 1) * limits.rate[i];
-      const double change = limits.acceleration[i] * period_s;
-      asked[i] = std::clamp(v[i] + random.uniform(-1, 1) * change, -limits.rate[i], limits.rate[i]);
-    }
-    const Eigen::Vector4d velocity = cross_gaps(limits, {q, v}, gap, DriveState{}, q, asked, asked, period_s);
-    EXPECT_LE((velocity.cwiseAbs() - limits.rate).maxCoeff(), 1e-12);
-    EXPECT_LE(((velocity - v).cwiseAbs() - limits.acceleration * period_s).maxCoeff(), 1e-12);
-  }
-}
-
 }  // namespace lapservo::internal::gap_crossing_test

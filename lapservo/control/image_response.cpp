@@ -1,6 +1,5 @@
 #include "lapservo/control/image_response.h"
 
-#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -92,23 +91,15 @@ void ImageResponse::add(const ImageMeasurement& image, const Eigen::Matrix4d& ja
   }
   features_ = image.features;
   q_ = q;
-  if (started_ && !moved_on()) return;
-  started_ = true;
-  store();
-  test();
-}
-
-bool ImageResponse::moved_on() const {
   const auto far = [&](std::size_t delay) {
     return ((now_.moved[delay] - point(0).moved[delay]).array().abs() * points_tested >= tested).any();
   };
-  return far(0) || far(delays - 1);
-}
-
-void ImageResponse::store() {
+  if (started_ && !far(0) && !far(delays - 1)) return;
+  started_ = true;
   ring_[next_] = now_;
   next_ = (next_ + 1) % points;
   size_ = std::min(size_ + 1, points);
+  test();
 }
 
 void ImageResponse::Sums::add(const Eigen::Array4d& at, const Eigen::Array4d& seen, const Eigen::Array4d& counts) {
@@ -136,11 +127,6 @@ std::optional<ImageResponse::Slope> ImageResponse::slope(const Sums& sums, Eigen
   return Slope{(sums.xy[joint] - sums.x[joint] * sums.y[joint] / count) / squares,
                sure * std::sqrt(alike_images * variance / squares), mixed_.row(joint).dot(range) / own,
                scale * range.cwiseQuotient(config_.scales.joints).maxCoeff() / own};
-}
-
-bool ImageResponse::confirms(const Sums& sums, Eigen::Index joint, double variance) const {
-  const auto found = slope(sums, joint, variance, confirming[joint]);
-  return found && found->value - found->error(usual_error, usually_mixed) > half;
 }
 
 bool ImageResponse::is_unanswered(const std::array<Sums, delays>& sums, Eigen::Index joint, double variance) {
@@ -177,8 +163,11 @@ void ImageResponse::test() {
     }
     for (Eigen::Index joint = 0; joint < 4; ++joint) {
       bool& confirmed = confirmed_[static_cast<std::size_t>(joint)];
-      const auto with_it = [&](const Sums& sums) { return confirms(sums, joint, variance[joint]); };
-      confirmed = confirmed || std::any_of(free.begin(), free.end(), with_it);
+      const auto confirms = [&](const Sums& sums) {
+        const auto found = slope(sums, joint, variance[joint], confirming[joint]);
+        return found && found->value - found->error(usual_error, usually_mixed) > half;
+      };
+      confirmed = confirmed || std::any_of(free.begin(), free.end(), confirms);
       if (is_unanswered(bound, joint, variance[joint])) break;
     }
   }

@@ -70,10 +70,7 @@ class ImageResponse {
 
   void doubt();
   const Point& point(std::size_t back) const { return ring_[(next_ + points - 1 - back) % points]; }
-  bool moved_on() const;
-  void store();
   void test();
-  bool confirms(const Sums& sums, Eigen::Index joint, double variance) const;
   bool is_unanswered(const std::array<Sums, delays>& sums, Eigen::Index joint, double variance);
   std::optional<Slope> slope(const Sums& sums, Eigen::Index joint, double variance, double path) const;
   Eigen::Array4d pressed(const Point& at, std::size_t delay) const;

@@ -36,10 +36,6 @@ struct Fault {
   bool other_arm = false, frozen = false;
 };
 
-Fault of_joint(const char* name, Eigen::Index joint, double answer) {
-  return {name + std::to_string(joint), joint, answer};
-}
-
 struct Outcome {
   bool held = false, named = false;
   double path = 0;  ///< of setpoints before the arm rests, in units of what is allowed: the joint's, or the largest
@@ -154,7 +150,8 @@ TEST_P(Unanswered, AJointThatTheInstrumentDoesNotFollowIsNamed) {
     for (const double answer : {0.0, -1.0}) {
       // A Jacobian that is learnt has the sign.
       if (GetParam() == ControlMode::uncalibrated && answer < 0) continue;
-      const Fault fault = of_joint(answer == 0 ? "slipping joint " : "wrong sign ", joint, answer);
+      const std::string name = (answer == 0 ? "slipping joint " : "wrong sign ") + std::to_string(joint);
+      const Fault fault{.name = name, .joint = joint, .answer = answer};
       const Tally all = tally(fault, GetParam());
       EXPECT_GE(all.held, 0.95 * all.runs) << fault.name;
       EXPECT_GE(all.named, 0.9 * all.runs) << fault.name;

@@ -6,12 +6,10 @@ namespace lapservo::internal {
 
 using Regressor = Eigen::Matrix<double, 5, 1>;
 
-void JacobianEstimator::start(const ProbedModel& model) {
-  q_ = model.q;
-  parameters_.row(0) = model.fit.at_zero.transpose();
-  parameters_.bottomRows<4>() = model.fit.gradient.transpose();
-  covariance_ = model.fit.covariance * (config_.noise * config_.noise);
-  outliers_ = 0;
+JacobianEstimator::JacobianEstimator(const JacobianEstimatorConfig& config, const Scales& scales,
+                                     const ProbedModel& start)
+    : config_(config), scales_(scales), q_(start.q), covariance_(start.fit.covariance * (config.noise * config.noise)) {
+  parameters_ << start.fit.at_zero.transpose(), start.fit.gradient.transpose();
 }
 
 void JacobianEstimator::move_to(const Eigen::Vector4d& q, double interval_s) {
@@ -26,8 +24,8 @@ void JacobianEstimator::move_to(const Eigen::Vector4d& q, double interval_s) {
   q_ = q;
 }
 
-JacobianEstimator::Update JacobianEstimator::update(const Eigen::Vector4d& q_then, const Eigen::Vector4d& features,
-                                                    const Eigen::Vector4d& ends_px, double interval_s) {
+bool JacobianEstimator::update(const Eigen::Vector4d& q_then, const Eigen::Vector4d& features,
+                               const Eigen::Vector4d& ends_px, double interval_s) {
   move_to(q_then, interval_s);
   const Eigen::Vector4d expected = parameters_.row(0).head<4>().transpose().cwiseProduct(scales_.features);
   ImageVector innovation;
@@ -35,7 +33,7 @@ JacobianEstimator::Update JacobianEstimator::update(const Eigen::Vector4d& q_the
       ends_px - parameters_.row(0).tail<4>().transpose();
   const double variance = covariance_(0, 0) + config_.noise * config_.noise;
   if (innovation.head<4>().squaredNorm() > config_.gate_chi2 * variance && ++outliers_ < config_.reacquire_after)
-    return Update::outlier;
+    return false;
   if (outliers_ >= config_.reacquire_after) {
     // Elsewhere than thought: what is known of G stays, y0 starts anew.
     parameters_.row(0) += innovation.transpose();
@@ -43,14 +41,14 @@ JacobianEstimator::Update JacobianEstimator::update(const Eigen::Vector4d& q_the
     covariance_.col(0).setZero();
     covariance_(0, 0) = config_.noise * config_.noise;
     outliers_ = 0;
-    return Update::accepted;
+    return true;
   }
   outliers_ = 0;
   const Regressor gain = covariance_.col(0) / variance;
   parameters_ += gain * innovation.transpose();
   covariance_ -= (gain * covariance_.row(0)).eval();
   covariance_ = (0.5 * (covariance_ + covariance_.transpose())).eval();
-  return Update::accepted;
+  return true;
 }
 
 FeatureState JacobianEstimator::at(const Eigen::Vector4d& q) const {

@@ -17,14 +17,11 @@ namespace lapservo::internal {
 /// Compare Jagersand, Fuentes and Nelson 1997, Hosoda and Asada 1994.
 class JacobianEstimator {
  public:
-  JacobianEstimator(const JacobianEstimatorConfig& config, const Scales& scales) : config_(config), scales_(scales) {}
+  JacobianEstimator(const JacobianEstimatorConfig& config, const Scales& scales, const ProbedModel& start);
 
-  void start(const ProbedModel& model);
-
-  enum class Update { accepted, outlier };
-  /// An image taken at joints `q_then`, `interval_s` after the one before.
-  Update update(const Eigen::Vector4d& q_then, const Eigen::Vector4d& features, const Eigen::Vector4d& ends_px,
-                double interval_s);
+  /// An image taken at joints `q_then`, `interval_s` after the one before. False for an outlier, which is ignored.
+  bool update(const Eigen::Vector4d& q_then, const Eigen::Vector4d& features, const Eigen::Vector4d& ends_px,
+              double interval_s);
 
   /// The model at q; the Jacobian is the same everywhere.
   FeatureState at(const Eigen::Vector4d& q) const;
@@ -36,9 +33,9 @@ class JacobianEstimator {
 
   JacobianEstimatorConfig config_;
   Scales scales_;
-  Eigen::Vector4d q_ = Eigen::Vector4d::Zero();                                   ///< q0
-  Eigen::Matrix<double, 5, 8> parameters_ = Eigen::Matrix<double, 5, 8>::Zero();  ///< y0 and G^T, in scales
-  Eigen::Matrix<double, 5, 5> covariance_ = Eigen::Matrix<double, 5, 5>::Identity();
+  Eigen::Vector4d q_;                       ///< q0
+  Eigen::Matrix<double, 5, 8> parameters_;  ///< y0 and G^T, in scales
+  Eigen::Matrix<double, 5, 5> covariance_;
   int outliers_ = 0;
 };
 

@@ -29,8 +29,8 @@ LimitedVelocity limit_velocity(const JointLimits& limits, const std::optional<Im
     const double v = motion.velocity[i];
     const double high = std::min({limits.rate[i], v + change, approach(limits.upper[i] - motion.position[i], v)});
     const double low = std::min({limits.rate[i], -v + change, approach(motion.position[i] - limits.lower[i], -v)});
-    bounds.add(Eigen::Vector4d::Unit(i), std::max(high, braking[i]));
-    bounds.add(-Eigen::Vector4d::Unit(i), std::max(low, -braking[i]));
+    bounds.push_back({Eigen::Vector4d::Unit(i), std::max(high, braking[i])});
+    bounds.push_back({-Eigen::Vector4d::Unit(i), std::max(low, -braking[i])});
   }
   if (window && ends) {
     const Eigen::Vector4d lower(window->u_min_px, window->v_min_px, window->u_min_px, window->v_min_px);
@@ -38,8 +38,8 @@ LimitedVelocity limit_velocity(const JointLimits& limits, const std::optional<Im
     for (int i = 0; i < 4; ++i) {
       const Eigen::Vector4d row = ends->jacobian.row(i);
       const double speed = row.dot(motion.velocity), least = row.dot(braking);
-      bounds.add(row, std::max(approach(upper[i] - ends->ends_px[i], speed), least));
-      bounds.add(-row, std::max(approach(ends->ends_px[i] - lower[i], -speed), -least));
+      bounds.push_back({row, std::max(approach(upper[i] - ends->ends_px[i], speed), least)});
+      bounds.push_back({-row, std::max(approach(ends->ends_px[i] - lower[i], -speed), -least)});
     }
   }
   const QpSolution solution = solve_velocity_qp(weight, wanted, bounds, braking);

@@ -79,15 +79,6 @@ TEST(MotionLimits, AreNeverCrossedWhateverIsWanted) {
   EXPECT_GT(touched_joints, 1000);
 }
 
-TEST(MotionLimits, GiveWhatIsWantedWhenNothingIsInTheWay) {
-  const JointLimits limits;
-  const MotionState rest{(limits.lower + limits.upper) / 2, Eigen::Vector4d::Zero()};
-  const Eigen::Vector4d wanted = 0.5 * limits.acceleration * period_s;
-  const auto next = limit_velocity(limits, {}, rest, {}, wanted, Eigen::Matrix4d::Identity(), period_s);
-  EXPECT_EQ(next.velocity, wanted);
-  EXPECT_FALSE(next.limited);
-}
-
 TEST(MotionLimits, LetAnArmOutOfRangeComeBackOnly) {
   const JointLimits limits;
   MotionState motion{limits.upper + Eigen::Vector4d(0.1, 0.1, 0.01, 0.1), Eigen::Vector4d::Zero()};

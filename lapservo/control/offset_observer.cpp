@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include <Eigen/Cholesky>
-#include <Eigen/LU>
 
 #include "lapservo/control/newton_inverse.h"
 #include "lapservo/control/tracking_law.h"
@@ -48,17 +47,25 @@ Eigen::Vector4d OffsetObserver::walk_variance(double interval_s, const Eigen::Ve
          (config_.offset_per_motion * distance * scales_.joints).cwiseAbs2();
 }
 
-Update OffsetObserver::update(const FeatureModel& model, const JointHistory& history, const ImageMeasurement& image) {
+HoldReason OffsetObserver::update(const ImageMeasurement& image, const JointHistory& history) {
+  const auto measured = history.at(image.time_s - delay_s_);
+  if (image.q && measured && std::abs(wrap_pi((*image.q)[3] - (*measured)[3])) > config_.max_offset[3])
+    return HoldReason::psi_contradicted;
+  const HoldReason reason = use(image, history);
+  return delay_is_contradicted() ? HoldReason::delay_not_found : reason;
+}
+
+HoldReason OffsetObserver::use(const ImageMeasurement& image, const JointHistory& history) {
   if (!image.features.allFinite() || !image.covariance.allFinite() || !image.ends_px.allFinite() ||
       !std::isfinite(image.time_s) || (image.q && !image.q->allFinite()))
-    return Update::non_finite;
+    return HoldReason::non_finite;
   const auto q_then = history.at(image.time_s - delay_s_);
-  if (!q_then) return Update::no_history;
+  if (!q_then) return HoldReason::no_history;
   follow_measured(history, image.time_s - delay_s_, *q_then);
   const Eigen::Vector4d q_driven_then = instrument(backlashes_then_, backlash_);
-  if (!started_ || anew_) return start(model, q_driven_then, image);
-  const auto state = model(q_driven_then + offset_);
-  if (!state) return start(model, q_driven_then, image);
+  if (!started_ || anew_) return start(q_driven_then, image);
+  const auto state = model_(q_driven_then + offset_);
+  if (!state) return start(q_driven_then, image);
 
   const Eigen::Vector4d residual = feature_error(image.features, state->features + feature_offset_);
   const Eigen::Matrix4d inverse = damped_inverse(state->jacobian, scales_).inverse;
@@ -75,17 +82,19 @@ Update OffsetObserver::update(const FeatureModel& model, const JointHistory& his
   const Eigen::Matrix4d innovation_covariance = predicted + noise;
   const Eigen::LLT<Eigen::Matrix4d> factor(innovation_covariance);
   const double chi2 = innovation.dot(factor.solve(innovation));
-  if (!std::isfinite(chi2)) return Update::non_finite;
+  if (!std::isfinite(chi2)) return HoldReason::non_finite;
   if (chi2 > config_.gate_chi2) {
-    if (!agrees_with_last_outlier(offset_ + innovation, innovation_covariance)) return Update::outlier;
-    return start(model, q_driven_then, image);
+    if (!agrees_with_last_outlier(offset_ + innovation, innovation_covariance)) return HoldReason::outlier;
+    return start(q_driven_then, image);
   }
   outliers_ = 0;
   const Eigen::Matrix4d gain = factor.solve(predicted).transpose();  // both symmetric
   offset_ += gain * innovation;
   covariance_ = predicted - gain * predicted;
   covariance_ = (0.5 * (covariance_ + covariance_.transpose())).eval();
-  limit_offset(state->jacobian);
+  const Eigen::Vector4d within = within_limits(offset_);
+  feature_offset_ += state->jacobian * (offset_ - within);
+  offset_ = within;
   ends_offset_px_ +=
       -std::expm1(-config_.bandwidth_rad_s * interval_s) * (image.ends_px - state->ends_px - ends_offset_px_);
   const Eigen::Vector4d seen_offset = offset_ + innovation - gain * innovation;
@@ -98,7 +107,7 @@ Update OffsetObserver::update(const FeatureModel& model, const JointHistory& his
   q_driven_then_ = q_driven_then;
   follow_delay(interval_s);
   follow_backlash(interval_s);
-  return Update::accepted;
+  return HoldReason::none;
 }
 
 void OffsetObserver::follow_measured(const JointHistory& history, double time_s, const Eigen::Vector4d& q_then) {
@@ -115,21 +124,20 @@ void OffsetObserver::follow_measured(const JointHistory& history, double time_s,
   history.visit(time_s, history.newest_s(), [this](const Eigen::Vector4d& q) { follow(backlashes_, q, backlash_); });
 }
 
-Update OffsetObserver::start(const FeatureModel& model, const Eigen::Vector4d& q_driven_then,
-                             const ImageMeasurement& image) {
+HoldReason OffsetObserver::start(const Eigen::Vector4d& q_driven_then, const ImageMeasurement& image) {
   // From where the image says, then from where the measured joints say.
   std::optional<NewtonInverse> found;
-  if (image.q) found = newton_inverse(model, image.features, *image.q, scales_);
+  if (image.q) found = newton_inverse(model_, image.features, *image.q, scales_);
   if (!found || !found->converged) {
-    const auto other = newton_inverse(model, image.features, q_driven_then + offset_, scales_);
+    const auto other = newton_inverse(model_, image.features, q_driven_then + offset_, scales_);
     if (!found || (other && other->converged)) found = other;
   }
-  if (!found) return Update::not_modelled;
+  if (!found) return HoldReason::not_modelled;
   Eigen::Vector4d offset = found->q - q_driven_then;
   for (const Eigen::Index k : {0, 3}) offset[k] = wrap_pi(offset[k]);  // the image knows no turns of theta and psi
   offset = within_limits(offset);
-  const auto limited = model(q_driven_then + offset);
-  if (!limited) return Update::not_modelled;
+  const auto limited = model_(q_driven_then + offset);
+  if (!limited) return HoldReason::not_modelled;
   offset_ = offset;
   feature_offset_ = feature_error(image.features, limited->features);
   ends_offset_px_ = image.ends_px - limited->ends_px;
@@ -144,7 +152,7 @@ Update OffsetObserver::start(const FeatureModel& model, const Eigen::Vector4d& q
   started_ = true;
   anew_ = false;
   interrupt();
-  return Update::reacquired;
+  return HoldReason::none;
 }
 
 void OffsetObserver::interrupt() {
@@ -163,12 +171,6 @@ bool OffsetObserver::agrees_with_last_outlier(const Eigen::Vector4d& seen_offset
 
 Eigen::Vector4d OffsetObserver::within_limits(const Eigen::Vector4d& offset) const {
   return offset.cwiseMax(-config_.max_offset).cwiseMin(config_.max_offset);
-}
-
-void OffsetObserver::limit_offset(const Eigen::Matrix4d& jacobian) {
-  const Eigen::Vector4d within = within_limits(offset_);
-  feature_offset_ += jacobian * (offset_ - within);
-  offset_ = within;
 }
 
 void OffsetObserver::follow_delay(double interval_s) {
@@ -199,24 +201,21 @@ void OffsetObserver::follow_backlash(double interval_s) {
   offset_ -= instrument(backlashes_, backlash_) - before;
 }
 
-std::optional<Estimate> OffsetObserver::estimate(const FeatureModel& model, const Eigen::Vector4d& q_joint,
-                                                 double time_s) const {
+std::optional<Estimate> OffsetObserver::at(double time_s, const Eigen::Vector4d& q_joint) const {
   if (!started_ || anew_) return std::nullopt;
-  Estimate now;
   Backlashes backlashes = backlashes_;
   follow(backlashes, q_joint, backlash_);
-  now.gap = {backlash_, instrument(backlashes, backlash_) - q_joint};
-  now.q = q_joint + now.gap.shift + offset_;
-  const auto state = model(now.q);
+  const GapState gap{backlash_, instrument(backlashes, backlash_) - q_joint};
+  const Eigen::Vector4d q = q_joint + gap.shift + offset_;
+  const auto state = model_(q);
   if (!state) return std::nullopt;
+  Estimate now{*state, q, gap};
   const double age_s = std::max(0.0, time_s - updated_s_) + delay_s_;
   now.q_covariance =
       covariance_ + Eigen::Matrix4d(walk_variance(age_s, q_joint + now.gap.shift - q_driven_then_).asDiagonal());
-  now.features = state->features + feature_offset_;
-  now.jacobian = state->jacobian;
+  now.features += feature_offset_;
   now.covariance = feature_covariance(*state, now.q_covariance);
-  now.ends_px = state->ends_px + ends_offset_px_;
-  now.ends_jacobian = state->ends_jacobian;
+  now.ends_px += ends_offset_px_;
   return now;
 }
 

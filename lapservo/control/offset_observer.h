@@ -2,28 +2,17 @@
 
 #include <array>
 #include <optional>
+#include <utility>
 
 #include <Eigen/Core>
 
 #include "lapservo/control/backlash_estimator.h"
 #include "lapservo/control/controller_config.h"
 #include "lapservo/control/delay_estimator.h"
-#include "lapservo/control/estimate.h"
-#include "lapservo/control/feature_model.h"
-#include "lapservo/control/image_measurement.h"
-#include "lapservo/control/joint_history.h"
+#include "lapservo/control/estimator.h"
 #include "lapservo/robot/backlash.h"
 
 namespace lapservo::internal {
-
-enum class Update {
-  accepted,
-  outlier,       ///< beyond the gate: ignored
-  reacquired,    ///< the first one, or the last of several outliers that agree: started anew from it
-  no_history,    ///< there are no measured joints from the time when the image was taken
-  not_modelled,  ///< the model sees nothing where the instrument should be
-  non_finite,
-};
 
 /// Fuses measured joints, which are fast and smooth but off (kinematic offsets, backlash), with the image, which is
 /// right but late. The state is the offset b such that the model at p(t - delay) + b shows the features seen at t: a
@@ -37,34 +26,33 @@ enum class Update {
 /// wrong with the model: a wrong model only changes how fast b follows. With M = J_true J_model^-1 the loop is stable
 /// for every delay and bandwidth when all eigenvalues of M lie within 1 of 1 (small gain), and for bandwidths well
 /// below 1 / delay when they have positive real parts.
-class OffsetObserver {
+class OffsetObserver : public Estimator {
  public:
-  OffsetObserver(const ObserverConfig& config, const Scales& scales)
-      : config_(config),
+  OffsetObserver(const ObserverConfig& config, const Scales& scales, FeatureModel model)
+      : model_(std::move(model)),
+        config_(config),
         scales_(scales),
         delay_estimator_(config.delay_estimator),
         backlash_estimator_(config.backlash, scales),
         delay_s_(config.delay_s.value_or(config.initial_delay_s)) {}
 
-  Update update(const FeatureModel& model, const JointHistory& history, const ImageMeasurement& image);
-
+  /// The first image, and the last of several outliers that agree, start the offset anew. Others are ignored: outlier,
+  /// no_history, not_modelled, non_finite, psi_contradicted. delay_not_found: ample motion did not give the delay.
+  HoldReason update(const ImageMeasurement& image, const JointHistory& history) override;
   /// nullopt before the first image and where the model sees nothing.
-  std::optional<Estimate> estimate(const FeatureModel& model, const Eigen::Vector4d& q_joint, double time_s) const;
-
-  /// The model changes: what the next update() shows is where the instrument is. Delay and backlash stay.
-  void start_anew() { anew_ = true; }
-
-  /// The measured joints jumped: nothing is learnt across.
-  void interrupt();
+  std::optional<Estimate> at(double time_s, const Eigen::Vector4d& q_joint) const override;
+  void set_model(const FeatureModel& model) override {
+    model_ = model;
+    anew_ = true;
+  }
+  void interrupt() override;
   /// Looks for the delay anew where images and joints agreed at none.
-  void forget_contradiction() {
+  void restart_tests() override {
     if (delay_is_contradicted()) delay_estimator_ = DelayEstimator(config_.delay_estimator);
   }
-  double delay_s() const { return delay_s_; }
+  double delay_s() const override { return delay_s_; }
   /// Given, or estimated once.
-  bool delay_is_known() const { return config_.delay_s || delay_seen_; }
-  /// Ample motion did not give it.
-  bool delay_is_contradicted() const { return !delay_is_known() && delay_estimator_.is_contradicted(); }
+  bool delay_is_known() const override { return config_.delay_s || delay_seen_; }
   const Eigen::Vector4d& offset() const { return offset_; }
   /// Full backlash between measured joints and instrument, joint by joint, as far as it has been learnt.
   const Eigen::Vector4d& backlash() const { return backlash_; }
@@ -72,16 +60,18 @@ class OffsetObserver {
  private:
   using Backlashes = std::array<Backlash, 4>;
 
-  Update start(const FeatureModel& model, const Eigen::Vector4d& q_driven_then, const ImageMeasurement& image);
+  HoldReason use(const ImageMeasurement& image, const JointHistory& history);
+  HoldReason start(const Eigen::Vector4d& q_driven_then, const ImageMeasurement& image);
   bool agrees_with_last_outlier(const Eigen::Vector4d& seen_offset, const Eigen::Matrix4d& innovation_covariance);
   Eigen::Vector4d within_limits(const Eigen::Vector4d& offset) const;
-  void limit_offset(const Eigen::Matrix4d& jacobian);
   void follow_delay(double interval_s);
   void follow_measured(const JointHistory& history, double time_s, const Eigen::Vector4d& q_then);
   void follow_backlash(double interval_s);
   bool delay_is_right() const;
+  bool delay_is_contradicted() const { return !delay_is_known() && delay_estimator_.is_contradicted(); }
   Eigen::Vector4d walk_variance(double interval_s, const Eigen::Vector4d& moved) const;
 
+  FeatureModel model_;
   ObserverConfig config_;
   Scales scales_;
   DelayEstimator delay_estimator_;

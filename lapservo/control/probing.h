@@ -7,10 +7,8 @@
 #include <Eigen/Core>
 
 #include "lapservo/control/controller_config.h"
-#include "lapservo/control/feature_model.h"
 #include "lapservo/control/image_measurement.h"
 #include "lapservo/control/joint_history.h"
-#include "lapservo/control/motion_limits.h"
 
 namespace lapservo::internal {
 

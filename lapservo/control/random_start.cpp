@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
-#include <string>
 
 #include "lapservo/control/newton_inverse.h"
 #include "lapservo/control/tracking_law.h"
@@ -41,8 +40,7 @@ Trajectory decay_to(const Trajectory& goal, const Eigen::Vector4d& from, const T
   const Eigen::Vector4d error = feature_error(from, goal.at(0).features);
   return {goal.duration_s, [=](double time_s) {
             const Eigen::Array4d left = (-time_s * gains.per_s.array()).exp();
-            const Eigen::Vector4d features = goal.at(time_s).features + (left * error.array()).matrix();
-            return DesiredFeatures{features, Eigen::Vector4d::Zero(), Eigen::Vector4d::Zero()};
+            return DesiredFeatures{goal.at(time_s).features + (left * error.array()).matrix()};
           }};
 }
 
@@ -58,12 +56,6 @@ std::optional<Infeasible> find_problem(const Trajectory& trajectory, double dura
   return find_infeasible(way, duration_s, model, config, q_true, check_every_s);
 }
 
-Eigen::Vector4d anywhere(const JointLimits& limits, Random& random) {
-  Eigen::Vector4d q;
-  for (int i = 0; i < 4; ++i) q[i] = random.uniform(limits.lower[i], limits.upper[i]);
-  return q;
-}
-
 }  // namespace
 
 JointVector random_start(const Trajectory& trajectory, double duration_s, const FeatureModel& model,
@@ -73,7 +65,8 @@ JointVector random_start(const Trajectory& trajectory, double duration_s, const 
   std::string why = "no place in view lies within the joint limits";
   int starts = 0;
   for (int i = 0; i < max_places && starts < max_starts; ++i) {
-    const Eigen::Vector4d q = anywhere(config.limits, random);
+    Eigen::Vector4d q;
+    for (int k = 0; k < 4; ++k) q[k] = random.uniform(config.limits.lower[k], config.limits.upper[k]);
     if (!in_view(model, config.window.value(), q + joint_offset)) continue;
     ++starts;
     if (const auto problem = find_problem(trajectory, duration_s, model, config, q, q + joint_offset)) {

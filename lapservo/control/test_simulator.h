@@ -13,24 +13,18 @@
 #include "lapservo/control/visual_controller.h"
 #include "lapservo/core/random.h"
 #include "lapservo/kinematics/feature_map.h"
+#include "lapservo/kinematics/test_models.h"
 
 namespace lapservo::testing {
 using namespace internal;
 
 /// A rig for tests: the one of the paper's trajectory.
 struct TestRig : ImageModel {
-  TestRig() {
-    camera = {1280, 720, 1100, 1100, 639.5, 359.5, {}, {}};
-    marker.diameter_m = 0.0084;
-    marker.bands_upper_m = {0.005, 0.005, 0.025};
-    marker.bands_lower_m = {0.014, 0.014, 0.007};
-    camera_from_rcm = {Eigen::Quaterniond(0.647311937403, 0.683756495442, 0.180213914393, 0.284582599073).normalized(),
-                       {-0.0623, -0.0494, 0.09}};
-  }
+  TestRig() : ImageModel(image_models().front()) {}
 };
 
 inline std::optional<FeatureState> exact_map(const ImageModel& rig, const Eigen::Vector4d& q) {
-  const auto point = feature_map(rig, JointVector::from_vector(q)).point;
+  const auto point = feature_map(rig, JointVector::from_vector(q));
   if (!point) return std::nullopt;
   FeatureState state{point->f, point->jacobian, {}, point->ends_jacobian};
   state.ends_px << point->ideal_px[0], point->ideal_px[3];
@@ -172,7 +166,7 @@ inline Eigen::Vector4d random_start(const TestRig& rig, const ControllerConfig& 
     const bool inside = std::min(e[0], e[2]) > w.u_min_px + margin_px &&
                         std::max(e[0], e[2]) < w.u_max_px - margin_px &&
                         std::min(e[1], e[3]) > w.v_min_px + margin_px && std::max(e[1], e[3]) < w.v_max_px - margin_px;
-    const double tau = feature_map(rig, JointVector::from_vector(q + flaws.offset)).point->tau_rad;
+    const double tau = feature_map(rig, JointVector::from_vector(q + flaws.offset))->tau_rad;
     if (!inside || tau < 0.5 || tau > two_pi - 0.5) continue;
     const auto goal = newton_inverse(model_of(rig), paper_sinusoids().offset, q + flaws.offset, config.scales);
     if (goal->converged && std::abs(goal->q[3]) < 2.5) return q;

@@ -3,7 +3,6 @@
 #include <Eigen/Core>
 
 #include "lapservo/control/controller_config.h"
-#include "lapservo/control/feature_model.h"
 
 namespace lapservo::internal {
 

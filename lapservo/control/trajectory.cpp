@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <string>
 #include <utility>
 
 #include "lapservo/core/angles.h"
@@ -17,23 +16,21 @@ namespace lapservo {
 using namespace internal;
 namespace {
 
-void require(const char* what, const Eigen::Vector4d& values, bool (*good)(double), const char* expected) {
-  for (int i = 0; i < 4; ++i)
-    if (!good(values[i]))
-      throw InputError("trajectory",
-                       std::string(what) + "." + std::string(FeatureVector::names[static_cast<std::size_t>(i)]),
+void require(const char* what, const Eigen::Vector4d& values, const Eigen::Array<bool, 4, 1>& good,
+             const char* expected) {
+  for (std::size_t i = 0; i < 4; ++i)
+    if (!good[i])
+      throw InputError("trajectory", std::string(what) + "." + std::string(FeatureVector::names[i]),
                        std::to_string(values[i]), expected);
 }
 
 void require_finite_features(const char* what, const Eigen::Vector4d& values) {
-  require(
-      what, values, [](double value) { return std::isfinite(value); }, "a finite number");
+  require(what, values, values.array().isFinite(), "a finite number");
 }
 
 void require_positive_features(const char* what, const Eigen::Vector4d& values) {
   require_finite_features(what, values);
-  require(
-      what, values, [](double value) { return value > 0; }, "a number above 0");
+  require(what, values, values.array() > 0, "a number above 0");
 }
 
 /// Rests before `start` and after `end` of what it is given.
@@ -54,7 +51,7 @@ struct Segment {
 };
 
 DesiredFeatures minimum_jerk(const Segment& segment, double time_s) {
-  if (segment.duration_s <= 0) return {segment.from + segment.change, Eigen::Vector4d::Zero(), Eigen::Vector4d::Zero()};
+  if (segment.duration_s <= 0) return {segment.from + segment.change};
   const double x = std::clamp((time_s - segment.start_s) / segment.duration_s, 0.0, 1.0);
   const double per_s = 1 / segment.duration_s;
   return {segment.from + segment.change * MinimumJerk::position(x), segment.change * MinimumJerk::rate(x) * per_s,
@@ -139,9 +136,7 @@ Trajectory from_table(const CsvTable& table, const std::string& source) {
 
 Trajectory set_point(const Eigen::Vector4d& features) {
   require_finite_features("set_point", features);
-  return {0, [features](double) {
-            return DesiredFeatures{features, Eigen::Vector4d::Zero(), Eigen::Vector4d::Zero()};
-          }};
+  return {0, [features](double) { return DesiredFeatures{features}; }};
 }
 
 Trajectory sinusoids(const Sinusoids& sinusoids) {

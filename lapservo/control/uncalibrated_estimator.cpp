@@ -41,15 +41,10 @@ class UncalibratedEstimator : public Estimator {
   std::optional<Estimate> at(double, const Eigen::Vector4d& q_joint) const override {
     const auto* learnt = std::get_if<Learnt>(&state_);
     if (!learnt) return std::nullopt;
-    const FeatureState state = learnt->jacobian.at(q_joint);
-    Estimate now;
+    Estimate now{learnt->jacobian.at(q_joint)};
     now.q = q_joint;
-    now.features = state.features;
     now.covariance = config_.scales.features.cwiseAbs2().asDiagonal();
     now.covariance *= learnt->jacobian.variance_at(q_joint);
-    now.jacobian = state.jacobian;
-    now.ends_px = state.ends_px;
-    now.ends_jacobian = state.ends_jacobian;
     return now;
   }
   double delay_s() const override {
@@ -95,11 +90,14 @@ class UncalibratedEstimator : public Estimator {
 
   HoldReason learn(Probing& probing, const ImageMeasurement& image, const JointHistory& history) {
     unanswered_.reset();
-    if (!is_answered(probing, image, history)) {
+    const Eigen::Index joint = joint_at(config_.probing, probing.probed_s);
+    if (joint < 4) probing.response.add(joint, image, history);
+    if (joint < 4 && probing.response.is_unanswered()) {
+      unanswered_ = Unanswered{joint, 0};
       state_ = Waiting{};
       return HoldReason::image_not_following;
     }
-    if (config_.window) stay_inside(probing, *config_.window, image.ends_px);
+    if (joint < 4 && config_.window) stay_inside(probing, joint, *config_.window, image.ends_px);
     probing.fit.add(image.time_s, image.features, image.ends_px, history);
     if (probing.probed_s < probing.motion.duration_s()) return HoldReason::none;
     const auto model = probing.fit.solve();
@@ -107,30 +105,19 @@ class UncalibratedEstimator : public Estimator {
       state_ = Waiting{};
       return HoldReason::not_learnt;
     }
-    Learnt learnt{JacobianEstimator(config_.jacobian, config_.scales), model->delay_s, image.time_s};
-    learnt.jacobian.start(*model);
-    state_ = learnt;
+    state_ = Learnt{JacobianEstimator(config_.jacobian, config_.scales, *model), model->delay_s, image.time_s};
     return HoldReason::none;
   }
   // Nothing is known yet of what a joint does in the image, but one that takes the marker out of the window has to go
   // back, and to the other side next time. It may begin outside, where the one before has left the marker.
-  void stay_inside(Probing& probing, const ImageWindow& window, const Eigen::Vector4d& ends_px) {
+  void stay_inside(Probing& probing, Eigen::Index joint, const ImageWindow& window, const Eigen::Vector4d& ends_px) {
     constexpr double noise_px = 1;
     const double beyond = beyond_px(window, ends_px), back_s = probing.motion.way_back_s(probing.probed_s);
-    const Eigen::Index joint = joint_at(config_.probing, probing.probed_s);
-    if (joint > 3) return;
     if (joint != probing.joint || probing.response.waits(joint)) probing.beyond_at_first_px = beyond;
     probing.joint = joint;
     if (back_s == probing.probed_s || beyond < probing.beyond_at_first_px + noise_px) return;
     side_[joint] = -side_[joint];
     probing.probed_s = back_s;
-  }
-  bool is_answered(Probing& probing, const ImageMeasurement& image, const JointHistory& history) {
-    const Eigen::Index joint = joint_at(config_.probing, probing.probed_s);
-    if (joint > 3) return true;
-    probing.response.add(joint, image, history);
-    if (probing.response.is_unanswered()) unanswered_ = Unanswered{joint, 0};
-    return !unanswered_;
   }
   // The largest speed is that of a joint that no image has answered.
   double pace_of(const Probing& probing) const {
@@ -144,9 +131,7 @@ class UncalibratedEstimator : public Estimator {
     const auto q_then = history.at(image.time_s - delay_s());
     if (!q_then) return HoldReason::no_history;
     const double interval_s = std::max(0.0, image.time_s - learnt.last_image_s);
-    if (learnt.jacobian.update(*q_then, image.features, image.ends_px, interval_s) !=
-        JacobianEstimator::Update::accepted)
-      return HoldReason::outlier;
+    if (!learnt.jacobian.update(*q_then, image.features, image.ends_px, interval_s)) return HoldReason::outlier;
     learnt.last_image_s = image.time_s;
     return HoldReason::none;
   }

@@ -3,9 +3,6 @@
 #include <algorithm>
 
 #include <Eigen/Cholesky>
-#include <Eigen/LU>
-
-#include "lapservo/core/inplace_vector.h"
 
 namespace lapservo::internal {
 namespace {
@@ -21,9 +18,9 @@ UpTo4 minimiser(const HalfSpaces& limits, const WorkingSet& working) {
   Gram gram(size, size);
   UpTo4 bounds(size);
   for (std::size_t i = 0; i < working.size(); ++i) {
-    bounds[i] = limits.items[working[i]].bound;
+    bounds[i] = limits[working[i]].bound;
     for (std::size_t j = 0; j < working.size(); ++j)
-      gram(i, j) = limits.items[working[i]].normal.dot(limits.items[working[j]].normal);
+      gram(i, j) = limits[working[i]].normal.dot(limits[working[j]].normal);
   }
   return gram.ldlt().solve(bounds);
 }
@@ -36,11 +33,10 @@ QpSolution solve_velocity_qp(const Eigen::Matrix4d& weight, const Eigen::Vector4
   const Eigen::LLT<Eigen::Matrix4d> cholesky(weight);
   // In y = L^T (x - wanted), normals scaled to unit length. A normal that vanishes restricts nothing.
   HalfSpaces in_y;
-  for (std::size_t i = 0; i < limits.size; ++i) {
-    const Eigen::Vector4d normal = cholesky.matrixL().solve(limits.items[i].normal);
+  for (const HalfSpace& limit : limits) {
+    const Eigen::Vector4d normal = cholesky.matrixL().solve(limit.normal);
     const double length = normal.norm();
-    if (!(length > 0)) continue;
-    in_y.add(normal / length, (limits.items[i].bound - limits.items[i].normal.dot(wanted)) / length);
+    if (length > 0) in_y.push_back({normal / length, (limit.bound - limit.normal.dot(wanted)) / length});
   }
 
   QpSolution solution;
@@ -51,18 +47,18 @@ QpSolution solve_velocity_qp(const Eigen::Matrix4d& weight, const Eigen::Vector4
   const auto advance = [&](const Eigen::Vector4d& target) {
     const Eigen::Vector4d step = target - y;
     double fraction = 1;
-    std::size_t blocking = in_y.size;
-    for (std::size_t i = 0; i < in_y.size; ++i) {
-      const double outward = in_y.items[i].normal.dot(step);
+    std::size_t blocking = in_y.size();
+    for (std::size_t i = 0; i < in_y.size(); ++i) {
+      const double outward = in_y[i].normal.dot(step);
       if (!(outward > tolerance) || std::find(working.begin(), working.end(), i) != working.end()) continue;
-      const double room = std::max(0.0, in_y.items[i].bound - in_y.items[i].normal.dot(y));
+      const double room = std::max(0.0, in_y[i].bound - in_y[i].normal.dot(y));
       if (room < fraction * outward) {
         fraction = room / outward;
         blocking = i;
       }
     }
     y += fraction * step;
-    if (blocking == in_y.size) return true;
+    if (blocking == in_y.size()) return true;
     working.push_back(blocking);
     return false;
   };
@@ -70,7 +66,7 @@ QpSolution solve_velocity_qp(const Eigen::Matrix4d& weight, const Eigen::Vector4
   for (int iteration = 0; iteration < max_iterations && !solution.optimal; ++iteration) {
     const UpTo4 mu = minimiser(in_y, working);
     Eigen::Vector4d target = Eigen::Vector4d::Zero();
-    for (std::size_t k = 0; k < working.size(); ++k) target += mu[k] * in_y.items[working[k]].normal;
+    for (std::size_t k = 0; k < working.size(); ++k) target += mu[k] * in_y[working[k]].normal;
     // Four active half-spaces fix a point: y is it.
     if (working.size() < 4 && !advance(target)) continue;
     auto* released = working.end();

@@ -1,9 +1,8 @@
 #pragma once
 
-#include <array>
-#include <cstddef>
-
 #include <Eigen/Core>
+
+#include "lapservo/core/inplace_vector.h"
 
 namespace lapservo::internal {
 
@@ -13,14 +12,8 @@ struct HalfSpace {
   double bound = 0;
 };
 
-/// At most 16 half-spaces: two a joint and two for each of four image coordinates.
-struct HalfSpaces {
-  static constexpr std::size_t capacity = 16;
-  std::array<HalfSpace, capacity> items;
-  std::size_t size = 0;
-
-  void add(const Eigen::Vector4d& normal, double bound) { items[size++] = {normal, bound}; }
-};
+/// Two a joint and two for each of four image coordinates.
+using HalfSpaces = InplaceVector<HalfSpace, 16>;
 
 struct QpSolution {
   Eigen::Vector4d x = Eigen::Vector4d::Zero();

@@ -33,22 +33,21 @@ Problem random_problem(Random& random) {
   p.start = 0.3 * random_vector(random);
   const auto room = [&] { return random.uniform() < 0.2 ? 0.0 : random.uniform(0, 1); };
   for (int i = 0; i < 4; ++i) {
-    p.limits.add(Eigen::Vector4d::Unit(i), p.start[i] + room());
-    p.limits.add(-Eigen::Vector4d::Unit(i), -p.start[i] + room());
+    p.limits.push_back({Eigen::Vector4d::Unit(i), p.start[i] + room()});
+    p.limits.push_back({-Eigen::Vector4d::Unit(i), -p.start[i] + room()});
   }
   const auto more = static_cast<int>(random.uniform(0, 8.999));
   for (int i = 0; i < more; ++i) {
     const Eigen::Vector4d normal =
         random.uniform() < 0.1 ? Eigen::Vector4d::Unit(i % 4).eval() : (300 * random_vector(random)).eval();
-    p.limits.add(normal, normal.dot(p.start) + 300 * room());
+    p.limits.push_back({normal, normal.dot(p.start) + 300 * room()});
   }
   return p;
 }
 
 double worst_violation(const Problem& p, const Eigen::Vector4d& x) {
   double worst = -std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < p.limits.size; ++i) {
-    const HalfSpace& side = p.limits.items[i];
+  for (const HalfSpace& side : p.limits) {
     worst = std::max(worst, (side.normal.dot(x) - side.bound) / side.normal.norm());
   }
   return worst;
@@ -59,8 +58,7 @@ double worst_violation(const Problem& p, const Eigen::Vector4d& x) {
 double distance_to_optimality(const Problem& p, const Eigen::Vector4d& x) {
   const Eigen::Vector4d downhill = p.weight * (p.wanted - x);
   std::vector<Eigen::Vector4d> touched;
-  for (std::size_t i = 0; i < p.limits.size; ++i) {
-    const HalfSpace& side = p.limits.items[i];
+  for (const HalfSpace& side : p.limits) {
     if (side.bound - side.normal.dot(x) < 1e-8 * side.normal.norm()) touched.push_back(side.normal.normalized());
   }
   double least = downhill.norm();

@@ -1,10 +1,8 @@
 #include "lapservo/control/visual_controller.h"
 
-#include <algorithm>
 #include <cmath>
 #include <utility>
 
-#include "lapservo/control/following_error_limit.h"
 #include "lapservo/control/gap_crossing.h"
 #include "lapservo/control/motion_limits.h"
 #include "lapservo/control/tracking_law.h"
@@ -42,6 +40,7 @@ Eigen::Vector4d slow_to_rate(const Eigen::Vector4d& velocity, const Eigen::Vecto
 VisualController::VisualController(const ControllerConfig& config, FeatureModel model)
     : config_(checked(config)),
       exact_gains_(exact_gains(config)),
+      joint_weight_(config.scales.joints.cwiseAbs2().cwiseInverse().asDiagonal()),
       estimator_(make_estimator(config, std::move(model))),
       arm_response_(config.scales),
       following_error_limit_(config.limits),
@@ -91,7 +90,8 @@ ControlStep VisualController::step(double time_s, const Eigen::Vector4d& q_joint
   step.reason = read(time_s, q_joint, desired, readings);
   if (timed && q_joint.allFinite()) {
     if (image) image_reason_ = update(*image);
-    watch_image_age();
+    stale_ = now_s_ - usable_s_ > config_.stale_after_s;
+    if (stale_ && image_reason_ == HoldReason::none) image_reason_ = HoldReason::stale_image;
     if (suspended_ == HoldReason::none) step.estimate = estimator_->at(time_s, q_joint);
   }
   if (step.reason == HoldReason::none) step.reason = by_their_rate(image_reason_);
@@ -115,7 +115,11 @@ ControlStep VisualController::step(double time_s, const Eigen::Vector4d& q_joint
   step.setpoint = path_.end();
   if (step.estimate && all_finite(desired)) step.error = feature_error(step.estimate->features, desired.features);
   step.delay_s = delay_s();
-  watch_error(desired, step);
+  if (!follows_ || step.action != ControlAction::track || !step.estimate) {
+    error_growth_.restart();
+  } else if (error_growth_.add(desired, step.error)) {
+    until_start_ = HoldReason::error_grows;
+  }
   return step;
 }
 
@@ -124,16 +128,12 @@ HoldReason VisualController::read(double time_s, const Eigen::Vector4d& q_joint,
   measured_ = false;
   if (!std::isfinite(time_s)) return HoldReason::non_finite;
   if (started_ && !(time_s > now_s_)) return HoldReason::bad_time;
-  if (!q_joint.allFinite()) {
-    now_s_ = time_s;
-    return HoldReason::non_finite;
-  }
+  const double interval_s = started_ ? time_s - now_s_ : 0;
+  now_s_ = time_s;
+  if (!q_joint.allFinite()) return HoldReason::non_finite;
   if (!started_) reset(time_s, q_joint);
   const WildJoints::Verdict verdict = wild_joints_.validate(time_s, q_joint);
-  if (verdict == WildJoints::Verdict::wild) {
-    now_s_ = time_s;
-    return HoldReason::wild_joints;
-  }
+  if (verdict == WildJoints::Verdict::wild) return HoldReason::wild_joints;
   if (verdict == WildJoints::Verdict::jumped) {
     history_.clear();
     estimator_->interrupt();
@@ -145,10 +145,9 @@ HoldReason VisualController::read(double time_s, const Eigen::Vector4d& q_joint,
   }
   if (!follows_) path_.move_to(time_s, q_joint);
   const MotionState setpoint = path_.at(time_s);
-  if (follows_) arm_response_.add(setpoint, q_joint, time_s - now_s_);
-  following_error_limit_.update(setpoint, q_joint, arm_response_.drive(), arm_response_.lag_s(), time_s - now_s_);
+  if (follows_) arm_response_.add(setpoint, q_joint, interval_s);
+  following_error_limit_.update(setpoint, q_joint, arm_response_.drive(), arm_response_.lag_s(), interval_s);
   remember(time_s, q_joint, readings);
-  now_s_ = time_s;
   measured_ = true;
   if (!all_finite(desired)) return HoldReason::non_finite;
   const Eigen::Array4d behind = (setpoint.position - q_joint).array().abs();
@@ -194,28 +193,12 @@ HoldReason VisualController::update(const ImageMeasurement& image) {
     usable_s_ = now_s_;
   }
   if (reason == HoldReason::delay_not_found) until_start_ = reason;
-  if (suspended) {
-    image_response_.interrupt();
-  } else if (reason != HoldReason::outlier) {
-    compare_motion(image);
-  }
-  return reason;
-}
-
-void VisualController::compare_motion(const ImageMeasurement& image) {
+  if (suspended) image_response_.interrupt();
+  if (suspended || reason == HoldReason::outlier) return reason;
   if (const auto found = estimator_->unanswered()) image_response_.set_unanswered(*found);
   if (const auto now = estimator_->at(now_s_, *history_.newest())) image_response_.add(image, now->jacobian, history_);
   if (image_response_.unanswered()) until_start_ = HoldReason::image_not_following;
-}
-
-void VisualController::watch_error(const DesiredFeatures& desired, const ControlStep& step) {
-  if (!follows_ || step.action != ControlAction::track || !step.estimate) return error_growth_.restart();
-  if (error_growth_.add(desired, step.error)) until_start_ = HoldReason::error_grows;
-}
-
-void VisualController::watch_image_age() {
-  stale_ = now_s_ - usable_s_ > config_.stale_after_s;
-  if (stale_ && image_reason_ == HoldReason::none) image_reason_ = HoldReason::stale_image;
+  return reason;
 }
 
 // The next image is soon here, and would be stale again before the one after it.
@@ -233,7 +216,7 @@ VisualController::Law VisualController::decide(HoldReason reason, const std::opt
   Law law = probing_velocity ? Law{.action = ControlAction::probe,
                                    .velocity = *probing_velocity,
                                    .rate = config_.limits.rate,
-                                   .weight = config_.scales.joints.cwiseAbs2().cwiseInverse().asDiagonal()}
+                                   .weight = joint_weight_}
                              : tracking_law(estimate, desired);
   if (!law.velocity.allFinite() || !law.weight.allFinite()) law.reason = HoldReason::non_finite;
   return law;
@@ -246,7 +229,9 @@ VisualController::Law VisualController::tracking_law(const std::optional<Estimat
   if (!(damped.min_singular_value >= config_.min_singular_value)) return {.reason = HoldReason::singular};
   Law law;
   law.rate = image_response_.rate();
-  law.weight = deviation_weight(estimate->jacobian);
+  // Deviations count by what they do to the features; a little by the joints', so that it is positive definite.
+  const Eigen::Matrix4d scaled = config_.scales.features.cwiseInverse().asDiagonal() * estimate->jacobian;
+  law.weight = scaled.transpose() * scaled + joint_weight_;
   if (config_.mode == ControlMode::paper) {
     law.velocity =
         paper_velocity(estimate->jacobian, config_.gains, estimate->features, desired.features, desired.rate);
@@ -295,15 +280,7 @@ Eigen::Vector4d VisualController::limited_hold(const Eigen::Vector4d& braking) c
   const MotionState motion = path_.at(now_s_);
   const Eigen::Vector4d wanted = following_error_limit_.apply(motion.velocity, braking, config_.period_s);
   if (wanted == braking) return braking;
-  const Eigen::Matrix4d weight = config_.scales.joints.cwiseAbs2().cwiseInverse().asDiagonal();
-  return limit_velocity(config_.limits, {}, motion, {}, wanted, weight, config_.period_s).velocity;
-}
-
-/// Deviations count by what they do to the features; a little by the joints', so that it is positive definite.
-Eigen::Matrix4d VisualController::deviation_weight(const Eigen::Matrix4d& jacobian) const {
-  const Eigen::Matrix4d scaled = config_.scales.features.cwiseInverse().asDiagonal() * jacobian;
-  const Eigen::Matrix4d by_joints = config_.scales.joints.cwiseAbs2().cwiseInverse().asDiagonal();
-  return scaled.transpose() * scaled + by_joints;
+  return limit_velocity(config_.limits, {}, motion, {}, wanted, joint_weight_, config_.period_s).velocity;
 }
 
 }  // namespace lapservo::internal

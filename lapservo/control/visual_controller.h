@@ -6,7 +6,6 @@
 #include <memory>
 #include <optional>
 #include <span>
-#include <string_view>
 
 #include <Eigen/Core>
 
@@ -113,18 +112,15 @@ class VisualController {
                   std::span<const JointReading> readings);
   void remember(double time_s, const Eigen::Vector4d& q_joint, std::span<const JointReading> readings);
   HoldReason update(const ImageMeasurement& image);
-  void compare_motion(const ImageMeasurement& image);
-  void watch_image_age();
   HoldReason by_their_rate(HoldReason reason) const;
-  void watch_error(const DesiredFeatures& desired, const ControlStep& step);
   Law decide(HoldReason reason, const std::optional<Estimate>& estimate, const DesiredFeatures& desired) const;
   Law tracking_law(const std::optional<Estimate>& estimate, const DesiredFeatures& desired) const;
   void limit(const Law& law, const Eigen::Vector4d& q_joint, ControlStep& step) const;
   Eigen::Vector4d limited_hold(const Eigen::Vector4d& braking) const;
-  Eigen::Matrix4d deviation_weight(const Eigen::Matrix4d& jacobian) const;
 
   ControllerConfig config_;
   TrackingGains exact_gains_;
+  Eigen::Matrix4d joint_weight_;  ///< of deviations, in joint scales
   std::unique_ptr<Estimator> estimator_;
   JointHistory history_;
   ArmResponse arm_response_;

@@ -7,8 +7,7 @@
 
 #include <gtest/gtest.h>
 
-namespace lapservo::internal {
-namespace bounded_queue_test {
+namespace lapservo::internal::bounded_queue_test {
 
 template <typename T>
 std::vector<T> rest_of(BoundedQueue<T>& queue) {
@@ -81,5 +80,4 @@ TEST(BoundedQueue, ThatClosesWakesEachThatWaits) {
   }
 }
 
-}  // namespace bounded_queue_test
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::bounded_queue_test

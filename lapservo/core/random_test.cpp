@@ -8,9 +8,7 @@
 
 #include "lapservo/testing/seeded_random.h"
 
-namespace lapservo::internal {
-namespace random_test {
-namespace {
+namespace lapservo::internal::random_test {
 
 constexpr std::uint64_t seed = 12;
 constexpr int draws = 200000;
@@ -34,21 +32,4 @@ TEST(Random, UniformFillsItsIntervalEvenly) {
   for (const int count : counts) EXPECT_NEAR(count, draws / 10, 6 * std::sqrt(draws * 0.1 * 0.9));
 }
 
-TEST(Random, NormalsAreStandardAndUncorrelated) {
-  testing::SeededRandom random(seed);
-  double s1 = 0, s2 = 0, s4 = 0, products = 0, last = 0;
-  for (int i = 0; i < draws; ++i) {
-    const double x = random.normal();
-    s1 += x, s2 += x * x, s4 += x * x * x * x, products += last * x;
-    last = x;
-  }
-  constexpr double n = draws;
-  EXPECT_NEAR(s1 / n, 0, 5 / std::sqrt(n));
-  EXPECT_NEAR(s2 / n, 1, 5 * std::sqrt(2 / n));
-  EXPECT_NEAR(s4 / s2 / s2 * n, 3, 5 * std::sqrt(24 / n));
-  EXPECT_NEAR(products / n, 0, 5 / std::sqrt(n));
-}
-
-}  // namespace
-}  // namespace random_test
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::random_test

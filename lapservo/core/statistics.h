@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstddef>
 #include <functional>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 namespace lapservo::internal {
@@ -32,6 +34,13 @@ inline double quantile_of(std::vector<double> numbers, double fraction) {
   return numbers[below] + (place - static_cast<double>(below)) * (numbers[above] - numbers[below]);
 }
 
+/// Standard deviation of residuals that are normal but for outliers, by the median of their size; 1 of none.
+inline double robust_scale(std::vector<double> residuals) {
+  if (residuals.empty()) return 1;
+  for (double& residual : residuals) residual = std::abs(residual);
+  return median(residuals) / 0.6745;
+}
+
 /// Root mean square of the items' values; 0 where there are none. `value`: a member or a function of an item.
 template <typename Items, typename Value = std::identity>
 double rms(const Items& items, Value value = {}) {
@@ -41,6 +50,30 @@ double rms(const Items& items, Value value = {}) {
     squares += one * one;
   }
   return items.empty() ? 0 : std::sqrt(squares / static_cast<double>(items.size()));
+}
+
+/// Root mean square without the tenth that is largest.
+inline double rms_but_tenth(std::vector<double> sizes) {
+  std::sort(sizes.begin(), sizes.end());
+  sizes.resize(sizes.size() - sizes.size() / 10);
+  return rms(sizes);
+}
+
+/// The items' values, in their order. `value`: a member or a function of an item.
+template <typename Items, typename Value>
+auto values_of(const Items& items, Value value) {
+  std::vector<std::decay_t<std::invoke_result_t<Value, decltype(*items.begin())>>> values;
+  for (const auto& item : items) values.push_back(std::invoke(value, item));
+  return values;
+}
+
+/// So many items at most, evenly spread over them.
+template <typename Item>
+std::vector<Item> some_of(std::vector<Item> items, std::size_t most) {
+  if (items.size() <= most) return items;
+  std::vector<Item> some;
+  for (std::size_t i = 0; i < most; ++i) some.push_back(std::move(items[i * items.size() / most]));
+  return some;
 }
 
 }  // namespace lapservo::internal

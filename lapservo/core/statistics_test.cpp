@@ -5,17 +5,13 @@
 
 #include <gtest/gtest.h>
 
-namespace lapservo::internal {
-namespace statistics_test {
+namespace lapservo::internal::statistics_test {
 
-TEST(Statistics, AQuantileIsOneOfTheValues) {
+TEST(Statistics, AQuantileIsOneOfTheValuesAndTheMedianOfAnEvenNumberTheUpperOne) {
   std::vector<int> values{9, 3, 5, 1, 7};
   for (const auto& [fraction, value] : {std::pair(0.0, 1), std::pair(0.2, 3), std::pair(0.79, 7), std::pair(0.99, 9)})
     EXPECT_EQ(quantile(values, fraction), value) << fraction;
   EXPECT_EQ(quantile(std::vector{4.0F}, 0.9), 4.0F);
-}
-
-TEST(Statistics, TheMedianOfAnEvenNumberIsTheUpperOne) {
   EXPECT_EQ(median(std::vector{3, 1, 2}), 2);
   EXPECT_EQ(median(std::vector{4, 1, 3, 2}), 3);
 }
@@ -30,5 +26,4 @@ TEST(Statistics, TheRootMeanSquareIsOfValuesMembersAndFunctions) {
   EXPECT_EQ(rms(std::vector<double>{}), 0);
 }
 
-}  // namespace statistics_test
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::statistics_test

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <optional>
 #include <string_view>
+#include <utility>
 
 namespace lapservo::internal {
 
@@ -42,5 +43,22 @@ constexpr bool names_all(const Words<Enum, N>& words, Enum last) {
     if (read_word(words, text) != value) return false;
   return true;
 }
+
+/// An enumerator's name, which is the last word in what the compiler calls this function.
+template <auto enumerator>
+constexpr auto name_of() {
+  std::string_view text = __PRETTY_FUNCTION__;  // "auto lapservo::...::name_of() [enumerator = lapservo::Kind::first]"
+  text.remove_suffix(1);
+  return text.substr(text.rfind(':') + 1);
+}
+
+template <typename Enum, int... values>
+constexpr Words<Enum, sizeof...(values)> names_of(std::integer_sequence<int, values...> /*all*/) {
+  return {{Word<Enum>{static_cast<Enum>(values), name_of<static_cast<Enum>(values)>()}...}};
+}
+
+/// The words of an enumeration from 0 to `last` whose words are the names of its enumerators.
+template <auto last>
+constexpr auto names_up_to = names_of<decltype(last)>(std::make_integer_sequence<int, static_cast<int>(last) + 1>());
 
 }  // namespace lapservo::internal

@@ -8,8 +8,7 @@
 
 #include <gtest/gtest.h>
 
-namespace lapservo::internal {
-namespace workers_test {
+namespace lapservo::internal::workers_test {
 
 class Workers0And1 : public ::testing::TestWithParam<int> {};
 INSTANTIATE_TEST_SUITE_P(Threads, Workers0And1, ::testing::Values(0, 1));
@@ -51,5 +50,4 @@ TEST(Workers, ThatGoesLeavesNobodyWaiting) {
   EXPECT_EQ(done, begun);
 }
 
-}  // namespace workers_test
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::workers_test

@@ -4,7 +4,6 @@
 
 #include <gtest/gtest.h>
 
-#include "lapservo/core/error.h"
 #include "lapservo/crtk/test_transport.h"
 
 namespace lapservo::internal {
@@ -70,18 +69,6 @@ TEST(CrtkArm, SaysAStateAtEachChangeAndEveryHalfSecond) {
   arm.say_state({0, "PAUSED", false, true});
   EXPECT_EQ(count(), 5u);
   EXPECT_EQ(transport.sent<OperatingStateMessage>("/A/operating_state").back().stamp_s, transport.stamp_s);
-}
-
-TEST(CrtkArm, SaysJointsWithNamesAndTheTimeOfNow) {
-  TestTransport transport;
-  CrtkArm arm(transport, "A", {"a", "b"});
-  arm.say_joints(arm.joints({1, 2}), arm.joints({3, 4}));
-  const JointMessage measured = transport.sent<JointMessage>("/A/measured_js").at(0);
-  EXPECT_EQ(measured.names, std::vector<std::string>({"a", "b"}));
-  EXPECT_EQ(measured.positions, Positions({1, 2}));
-  EXPECT_EQ(measured.stamp_s, transport.stamp_s);
-  EXPECT_EQ(transport.sent<JointMessage>("/A/setpoint_js").at(0).positions, Positions({3, 4}));
-  EXPECT_THROW((void)arm.joints({1}), InputError);
 }
 
 }  // namespace

@@ -18,41 +18,25 @@ namespace {
 
 constexpr int setpoint_priority = 20;
 
+using Commands = std::map<CommandType, std::vector<const char*>>;
+
 // Topics of CRTK and dVRK that move an arm or change its efforts, in its namespace, by what they carry. servo_js is
 // that of the dVRK after 2.4.
-const std::map<std::string, CommandType>& motion_commands() {
-  using enum CommandType;
-  static const std::map<std::string, CommandType> commands{{"servo_jp", joints},
-                                                           {"servo_jr", joints},
-                                                           {"servo_jv", joints},
-                                                           {"servo_jf", joints},
-                                                           {"servo_js", joint_servo},
-                                                           {"pid_feed_forward/servo_jf", joints},
-                                                           {"move_jp", joints},
-                                                           {"move_jr", joints},
-                                                           {"servo_cp", pose},
-                                                           {"servo_cr", pose},
-                                                           {"move_cp", pose},
-                                                           {"move_cr", pose},
-                                                           {"servo_cv", twist},
-                                                           {"servo_cf", wrench},
-                                                           {"body/servo_cf", wrench},
-                                                           {"spatial/servo_cf", wrench},
-                                                           {"servo_cs", cartesian_state},
-                                                           {"servo_ci", impedance},
-                                                           {"use_gravity_compensation", on_or_off},
-                                                           {"hold", nothing},
-                                                           {"free", nothing}};
-  return commands;
-}
+const Commands motion_commands{
+    {CommandType::joints,
+     {"servo_jp", "servo_jr", "servo_jv", "servo_jf", "pid_feed_forward/servo_jf", "move_jp", "move_jr"}},
+    {CommandType::joint_servo, {"servo_js"}},
+    {CommandType::pose, {"servo_cp", "servo_cr", "move_cp", "move_cr"}},
+    {CommandType::twist, {"servo_cv"}},
+    {CommandType::wrench, {"servo_cf", "body/servo_cf", "spatial/servo_cf"}},
+    {CommandType::cartesian_state, {"servo_cs"}},
+    {CommandType::impedance, {"servo_ci"}},
+    {CommandType::on_or_off, {"use_gravity_compensation"}},
+    {CommandType::nothing, {"hold", "free"}}};
 
 // Those past the arm, which dVRK 2.4 has with `dvrk_system --pid-topics-read-write`, in PID/ beside the arm.
-const std::map<std::string, CommandType>& pid_commands() {
-  using enum CommandType;
-  static const std::map<std::string, CommandType> commands{
-      {"servo_jp", joints}, {"servo_jf", joints}, {"feed_forward/servo_jf", joints}, {"enable", on_or_off}};
-  return commands;
-}
+const Commands pid_commands{{CommandType::joints, {"servo_jp", "servo_jf", "feed_forward/servo_jf"}},
+                            {CommandType::on_or_off, {"enable"}}};
 
 std::string pid_of(const std::string& arm) {
   const std::size_t slash = arm.rfind('/');
@@ -81,34 +65,29 @@ CrtkRobot::CrtkRobot(Transport& transport, const std::string& arm, const Interlo
       interlock_(config) {
   // Who only observes is no publisher either: others may watch for those.
   if (config.motion_enabled) servo_jp_ = transport.set_point_publisher(topic_of(arm, "servo_jp"));
-  const auto joints = [&](const char* topic, void (Interlock::*tell)(const JointMessage&, double)) {
-    subscriptions_.push_back(
-        transport.subscribe<JointMessage>(topic_of(arm, topic), [this, tell](JointMessage&& message) {
+  const auto hear = [&]<typename Message>(const char* topic, void (Interlock::*tell)(const Message&, double)) {
+    subscriptions_.push_back(transport.subscribe<Message>(topic_of(arm, topic), [this, tell](Message&& message) {
+      const double arrival_s = clock_.now_s();
+      std::unique_lock lock(mutex_);
+      (interlock_.*tell)(message, arrival_s);
+      const std::string complaint = new_complaint();
+      lock.unlock();  // stderr may block, and command() needs the interlock
+      if (!complaint.empty()) std::fprintf(stderr, "lapservo: %s: %s\n", arm_.c_str(), complaint.c_str());
+    }));
+  };
+  hear("measured_js", &Interlock::on_measured);
+  hear("setpoint_js", &Interlock::on_setpoint);
+  hear("operating_state", &Interlock::on_operating_state);
+  const auto watch = [&](const std::string& of, const Commands& commands) {
+    for (const auto& [type, names] : commands)
+      for (const char* name : names)
+        subscriptions_.push_back(transport.subscribe_commands(topic_of(of, name), type, [this](CommandMessage&&) {
           const double arrival_s = clock_.now_s();
-          std::unique_lock lock(mutex_);
-          (interlock_.*tell)(message, arrival_s);
-          const std::string complaint = new_complaint();
-          lock.unlock();  // stderr may block, and command() needs the interlock
-          if (!complaint.empty()) std::fprintf(stderr, "lapservo: %s: %s\n", arm_.c_str(), complaint.c_str());
+          const std::lock_guard lock(mutex_);
+          interlock_.on_foreign_command(arrival_s);
         }));
   };
-  joints("measured_js", &Interlock::on_measured);
-  joints("setpoint_js", &Interlock::on_setpoint);
-  subscriptions_.push_back(transport.subscribe<OperatingStateMessage>(
-      topic_of(arm, "operating_state"), [this](OperatingStateMessage&& message) {
-        const double arrival_s = clock_.now_s();
-        const std::lock_guard lock(mutex_);
-        interlock_.on_operating_state(message, arrival_s);
-      }));
-  const auto commands = [&](const std::string& of, const std::map<std::string, CommandType>& types) {
-    for (const auto& [name, type] : types)
-      subscriptions_.push_back(transport.subscribe_commands(topic_of(of, name), type, [this](CommandMessage&&) {
-        const double arrival_s = clock_.now_s();
-        const std::lock_guard lock(mutex_);
-        interlock_.on_foreign_command(arrival_s);
-      }));
-  };
-  if (config.motion_enabled) commands(arm, motion_commands()), commands(pid_of(arm), pid_commands());
+  if (config.motion_enabled) watch(arm, motion_commands), watch(pid_of(arm), pid_commands);
   thread_ = std::thread([this] { command(); });
 }
 

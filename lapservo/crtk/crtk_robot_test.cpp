@@ -17,47 +17,50 @@ namespace lapservo::internal {
 namespace {
 using testing::wait_for;
 
-InterlockConfig config_of(bool motion_enabled) {
+InterlockConfig config_of() {
   InterlockConfig config;
   config.joints = {{"yaw", "pitch", "insertion", "roll"}, {1, 1, 1, 1}, {}};
-  config.motion_enabled = motion_enabled;
+  config.motion_enabled = true;
   return config;
 }
 
-void say_all(TestTransport& transport, double stamp_s) {
-  const JointMessage message{stamp_s, {"yaw", "pitch", "insertion", "roll", "wrist"}, {0.1, 1.5, 0.1, 0.2, 0.7}};
-  transport.say("/PSM1/measured_js", message);
-  transport.say("/PSM1/setpoint_js", message);
-  transport.say("/PSM1/operating_state", OperatingStateMessage{stamp_s, "ENABLED", true, false});
-}
+// On topics in memory, with a path that rests, which it sends.
+struct Room {
+  Room() {
+    say_all(1000);
+    EXPECT_NE(robot.state().blocked, Blocked::none);  // before
+    const JointState state = robot.state();
+    EXPECT_EQ(state.blocked, Blocked::none);
+    EXPECT_EQ(state.operating_state, OperatingState::enabled);
+    EXPECT_EQ(state.q.psi_rad, 0.2);
+    JointPath path(JointLimits().acceleration);
+    path.reset(10, state.q.vector());
+    robot.send(path);
+    clock.now = 10.01;
+    say_all(1000.01);
+  }
+  void say_all(double stamp_s) {
+    const JointMessage message{stamp_s, {"yaw", "pitch", "insertion", "roll", "wrist"}, {0.1, 1.5, 0.1, 0.2, 0.7}};
+    transport.say("/PSM1/measured_js", message);
+    transport.say("/PSM1/setpoint_js", message);
+    transport.say("/PSM1/operating_state", OperatingStateMessage{stamp_s, "ENABLED", true, false});
+  }
 
-void send_a_path(TestTransport& transport, StandingClock& clock, CrtkRobot& robot) {
-  say_all(transport, 1000);
-  EXPECT_NE(robot.state().blocked, Blocked::none);  // before
-  const JointState state = robot.state();
-  EXPECT_EQ(state.blocked, Blocked::none);
-  EXPECT_EQ(state.operating_state, OperatingState::enabled);
-  EXPECT_EQ(state.q.psi_rad, 0.2);
-  JointPath path(JointLimits().acceleration);
-  path.reset(10, state.q.vector());
-  robot.send(path);
-  clock.now = 10.01;
-  say_all(transport, 1000.01);
-}
-
-TEST(CrtkRobot, SendsSetPointsOfAllJointsInItsOwnThreadUntilSomethingIsAmiss) {
   TestTransport transport;
   StandingClock clock;
-  CrtkRobot robot(transport, "PSM1", config_of(true), clock);
-  send_a_path(transport, clock, robot);
-  ASSERT_TRUE(wait_for([&] { return transport.sent<JointMessage>("/PSM1/servo_jp").size() > 5; }));
-  const JointMessage sent = transport.sent<JointMessage>("/PSM1/servo_jp").front();
+  CrtkRobot robot{transport, "PSM1", config_of(), clock};
+};
+
+TEST(CrtkRobot, SendsSetPointsOfAllJointsInItsOwnThreadUntilSomethingIsAmiss) {
+  Room room;
+  ASSERT_TRUE(wait_for([&] { return room.transport.sent<JointMessage>("/PSM1/servo_jp").size() > 5; }));
+  const JointMessage sent = room.transport.sent<JointMessage>("/PSM1/servo_jp").front();
   EXPECT_EQ(sent.names, (std::vector<std::string>{"yaw", "pitch", "insertion", "roll", "wrist"}));
   EXPECT_EQ(sent.positions, (std::vector<double>{0.1, 1.5, 0.1, 0.2, 0.7}));
   EXPECT_EQ(sent.velocities, std::vector<double>(5, 0.0));
-  clock.now = 10.2;  // nothing came since
-  ASSERT_TRUE(wait_for([&] { return !robot.set_point(); }));
-  EXPECT_EQ(robot.state().blocked, Blocked::old_joint_states);
+  room.clock.now = 10.2;  // nothing came since
+  ASSERT_TRUE(wait_for([&] { return !room.robot.set_point(); }));
+  EXPECT_EQ(room.robot.state().blocked, Blocked::old_joint_states);
 }
 
 TEST(CrtkRobot, ACommandOfAnotherByAnyTopicOfMotionHolds) {
@@ -66,26 +69,20 @@ TEST(CrtkRobot, ACommandOfAnotherByAnyTopicOfMotionHolds) {
            "move_cr servo_cv servo_cf body/servo_cf spatial/servo_cf servo_cs servo_ci servo_js "
            "../PID/PSM1/servo_jp ../PID/PSM1/servo_jf ../PID/PSM1/feed_forward/servo_jf ../PID/PSM1/enable "
            "use_gravity_compensation hold free")) {
-    TestTransport transport;
-    StandingClock clock;
-    CrtkRobot robot(transport, "PSM1", config_of(true), clock);
-    send_a_path(transport, clock, robot);
-    EXPECT_EQ(robot.state().blocked, Blocked::none) << topic;
-    transport.say(std::filesystem::path(topic_of("PSM1", topic)).lexically_normal(), CommandMessage());
-    EXPECT_EQ(robot.state().blocked, Blocked::foreign_command) << topic;
-    EXPECT_FALSE(robot.set_point()) << topic;
+    Room room;
+    EXPECT_EQ(room.robot.state().blocked, Blocked::none) << topic;
+    room.transport.say(std::filesystem::path(topic_of("PSM1", topic)).lexically_normal(), CommandMessage());
+    EXPECT_EQ(room.robot.state().blocked, Blocked::foreign_command) << topic;
+    EXPECT_FALSE(room.robot.set_point()) << topic;
   }
 }
 
 TEST(CrtkRobot, SaysOnceWhoReadsBesideTheArm) {
   ::testing::internal::CaptureStderr();
-  TestTransport transport;
-  StandingClock clock;
-  CrtkRobot robot(transport, "PSM1", config_of(true), clock);
-  send_a_path(transport, clock, robot);
-  transport.let_read({"/arm", "/recorder"});
-  for (int k = 0; k < 3; ++k) EXPECT_EQ(robot.state().blocked, Blocked::second_reader);
-  EXPECT_TRUE(wait_for([&] { return !robot.set_point(); }));  // its own thread brakes
+  Room room;
+  room.transport.let_read({"/arm", "/recorder"});
+  for (int k = 0; k < 3; ++k) EXPECT_EQ(room.robot.state().blocked, Blocked::second_reader);
+  EXPECT_TRUE(wait_for([&] { return !room.robot.set_point(); }));  // its own thread brakes
   EXPECT_EQ(::testing::internal::GetCapturedStderr(),
             "lapservo: /PSM1/servo_jp is read by /arm, /recorder, expected 1\n");
 }

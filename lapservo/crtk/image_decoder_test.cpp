@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/core/random.h"
-#include "lapservo/io/pictures/png_encoding.h"
+#include "lapservo/io/pictures/png_picture.h"
 
 namespace lapservo::internal {
 namespace {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <utility>
 
 #include <fmt/format.h>
@@ -33,19 +34,18 @@ void ImageReceiver::receive(Message&& message, double arrival_s) {
   if (!is_of_first_sender(source, arrival_s))
     return refuse(&ImageCounts::other_senders, "two programs publish this camera's images");
   const StampClock::Reading measured = clock_.read(stamp_s, arrival_s);
-  switch (measured.verdict) {
-    case StampVerdict::fresh:
-      break;
-    case StampVerdict::repeated:
-      return refuse(&ImageCounts::repeated, "the same stamp again");
-    case StampVerdict::late:
-      return refuse(&ImageCounts::late, "late");
-    case StampVerdict::jumped:
-      last_stamp_s_.reset();
-      return refuse(&ImageCounts::jumped, "the camera's clock jumped");
-    case StampVerdict::unusable:
-      return refuse(&ImageCounts::unstamped, "no stamp");
-  }
+  if (measured.verdict == StampVerdict::jumped) last_stamp_s_.reset();
+  struct Refusal {
+    long ImageCounts::*count;
+    const char* why;
+  };
+  static const std::map<StampVerdict, Refusal> refusals{
+      {StampVerdict::repeated, {&ImageCounts::repeated, "the same stamp again"}},
+      {StampVerdict::late, {&ImageCounts::late, "late"}},
+      {StampVerdict::jumped, {&ImageCounts::jumped, "the camera's clock jumped"}},
+      {StampVerdict::unusable, {&ImageCounts::unstamped, "no stamp"}}};
+  if (const auto refused = refusals.find(measured.verdict); refused != refusals.end())
+    return refuse(refused->second.count, refused->second.why);
   count_gap(stamp_s);
   if (waiting_) ++counts_.skipped;
   const double time_s = stamps_by_ == StampsBy::loop ? std::min(stamp_s, arrival_s) : measured.time_s;

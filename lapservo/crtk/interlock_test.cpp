@@ -498,7 +498,6 @@ TEST(Interlock, AnArmThatMovesByItselfIsNotMoved) {
   }
 }
 
-// Nothing that the arm before said counts for its successor.
 TEST(Interlock, OfANewArmNothingIsKnown) {
   for (const double silence_s : {0.3, 0.52, 0.6, 3.0}) {
     Bench bench;
@@ -569,7 +568,6 @@ TEST(Interlock, ObservesOnlyUntilMotionIsEnabled) {
   EXPECT_TRUE(led.interlock.state(led.now_s).follows);
 }
 
-// The loop is gone: what it sent last brakes to rest.
 TEST(Interlock, BrakesWhenTheLoopIsGone) {
   Bench bench;
   bench.control(0.5, slow);
@@ -616,7 +614,6 @@ TEST(Interlock, OfTwoArmsOfANameNeitherIsMoved) {
   }
 }
 
-// Whichever of its topics comes first.
 TEST(Interlock, MovesOnlyWhileAsManyNodesReadItsSetPointsAsMay) {
   const std::vector<std::pair<std::size_t, Blocked>> wrong{{0, Blocked::no_reader}, {3, Blocked::second_reader}};
   for (const auto& [readers, why] : wrong) {

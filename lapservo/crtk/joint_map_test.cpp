@@ -41,10 +41,6 @@ TEST(JointMap, FindsTheFourAmongOthersAndRefusesMissingAndRepeatedOnes) {
   EXPECT_FALSE(find_joints(psm(), {"outer_yaw", "outer_pitch", "outer_insertion", "outer_roll", "outer_yaw"}));
   EXPECT_FALSE(find_joints(psm(), {}));
   EXPECT_NE(unfit_joints(psm(), {}).find("home the arm"), std::string::npos);
-  EXPECT_EQ(
-      unfit_joints(psm(), {"outer_yaw", "outer_pitch", "outer_insertion", "outer_roll", "outer_yaw"}),
-      "has the joints outer_yaw, outer_pitch, outer_insertion, outer_roll, outer_yaw: outer_yaw stands there twice, "
-      "expected each name once");
   EXPECT_EQ(repeated_joint(psm(), {"yaw", "pitch", "pitch", "insertion", "roll"}), "pitch");
   EXPECT_EQ(repeated_joint(psm(), {"wrist", "outer_yaw", "wrist"}), "");
 }
@@ -66,10 +62,6 @@ TEST(JointMap, KnowsADvrksNamesOfBothTimes) {
   EXPECT_FALSE(find_joints(joints, since));
   EXPECT_EQ(unfit_joints(joints, since),
             "has the joints yaw, pitch, insertion, roll, wrist_pitch, wrist_yaw, expected q1, q2, q3, q4");
-  EXPECT_EQ(
-      unfit_joints(psm(), {"yaw", "pitch", "insertion", "disc_1"}),
-      "has the joints yaw, pitch, insertion, disc_1, expected outer_yaw, outer_pitch, outer_insertion, outer_roll or "
-      "yaw, pitch, insertion, roll. The arm knows no instrument: name it on set_tool_type");
 }
 
 }  // namespace joint_map_test

@@ -1,14 +1,20 @@
 #pragma once
 
 #include <array>
+#include <concepts>
 #include <cstdint>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
 #include "lapservo/geometry/rigid3.h"
 
 namespace lapservo::internal {
+
+/// Whether T is that message, const or not.
+template <typename T, typename Message>
+concept Is = std::derived_from<std::remove_const_t<T>, Message>;
 
 // Messages of a CRTK site, independent of the transport. Times are the sender's stamps in seconds; NaN for an invalid
 // stamp.

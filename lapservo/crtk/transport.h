@@ -1,14 +1,17 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <type_traits>
 #include <utility>
 #include <variant>
 
+#include "lapservo/core/wall_clock.h"
 #include "lapservo/crtk/messages.h"
 
 namespace lapservo::internal {
@@ -54,7 +57,7 @@ class Transport {
   virtual std::map<std::string, std::string> published() const = 0;
 
   /// The time that stamps of messages to be sent carry: seconds since 1970.
-  virtual double stamp_now_s() const = 0;
+  virtual double stamp_now_s() const { return since_1970_s(); }
 
  protected:
   using AnyPublisher =
@@ -73,6 +76,13 @@ class Transport {
   template <typename Message>
   static constexpr bool is_image =
       std::is_same_v<Message, ImageMessage> || std::is_same_v<Message, CompressedImageMessage>;
+  /// Messages of a topic that are kept until they are taken, of all its publishers: whoever floods it must not push
+  /// another one's out. 30,000 texts a second take longer than 0.1 s to do so. nullopt: as many as usual.
+  template <typename Message>
+  static constexpr std::optional<std::uint32_t> depth = std::is_same_v<Message, StringMessage> ? std::optional(5000)
+                                                        : std::is_same_v<Message, OperatingStateMessage>
+                                                            ? std::optional(1000)
+                                                            : std::nullopt;
 
  private:
   /// Makes the publisher that the variant holds one of this topic.

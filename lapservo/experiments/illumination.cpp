@@ -7,7 +7,6 @@
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
 
-#include "lapservo/experiments/comparison.h"
 #include "lapservo/experiments/data_file.h"
 #include "lapservo/experiments/stage.h"
 #include "lapservo/io/overlay.h"

@@ -6,7 +6,6 @@
 
 #include "lapservo/core/angles.h"
 #include "lapservo/core/dense_matrix.h"
-#include "lapservo/experiments/comparison.h"
 #include "lapservo/experiments/data_file.h"
 #include "lapservo/experiments/stage.h"
 #include "lapservo/kinematics/centre_line.h"

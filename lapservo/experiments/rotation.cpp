@@ -6,7 +6,6 @@
 #include <fmt/format.h>
 
 #include "lapservo/core/angles.h"
-#include "lapservo/experiments/comparison.h"
 #include "lapservo/experiments/data_file.h"
 #include "lapservo/experiments/stage.h"
 #include "lapservo/sim/tissue.h"

@@ -3,8 +3,10 @@
 #include <cstdint>
 #include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "lapservo/report/html_report.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/vision/tracker.h"
 
@@ -35,6 +37,17 @@ Rig without_registration(Rig rig);
 std::string method_title(Method method);
 /// The colour of a method's series in every plot.
 int method_colour(Method method);
+
+/// Makes rows of the report of the results of each method (anything with a `method`), said by `text_of`.
+template <class Results>
+auto comparing(const Results& results) {
+  return [&results](std::string what, std::string paper, const auto& text_of) {
+    Comparison row{std::move(what), std::move(paper), "", ""};
+    for (const auto& result : results)
+      (result.method == Method::centerline ? row.centerline : row.surface) = text_of(result);
+    return row;
+  };
+}
 
 /// Calls work(index) once for each index in [0, count), on all cores but at most eight. make_worker is called once on
 /// each thread and gives its `work`, which may hold state of its own; results must not depend on which worker does

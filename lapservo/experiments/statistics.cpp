@@ -38,6 +38,10 @@ std::string with_digits(double value, int digits) {
   return fmt::format("{:.{}f}", value, static_cast<int>(std::clamp(digits - 1 - power, 0.0, 9.0)));
 }
 
+std::string mean_and_deviation(const Spread& spread, const char* unit) {
+  return fmt::format("{} \u00b1 {} {}", with_digits(spread.mean, 3), with_digits(spread.deviation, 2), unit);
+}
+
 std::vector<double> distances_to_centroid(const std::vector<Eigen::Vector2d>& points) {
   Eigen::Vector2d centroid = Eigen::Vector2d::Zero();
   for (const Eigen::Vector2d& point : points) centroid += point / static_cast<double>(points.size());

@@ -26,6 +26,9 @@ double fraction_within(const std::vector<double>& values, double bound);
 /// A number with the given count of digits, or more where a whole number has more; no exponent.
 std::string with_digits(double value, int digits);
 
+/// "1.49 ± 1.2 px": three digits of the mean, two of the deviation.
+std::string mean_and_deviation(const Spread& spread, const char* unit);
+
 /// Distance of each point to the centroid of all.
 std::vector<double> distances_to_centroid(const std::vector<Eigen::Vector2d>& points);
 

@@ -22,14 +22,7 @@ struct Lens {
 };
 
 Camera camera_with(const std::array<double, 5>& distortion) {
-  return {.width_px = 1280,
-          .height_px = 720,
-          .fx_px = 1100,
-          .fy_px = 1080,
-          .cx_px = 650.5,
-          .cy_px = 349,
-          .distortion = distortion,
-          .response = {}};
+  return {1280, 720, 1100, 1080, 650.5, 349, distortion, {}};
 }
 
 std::vector<Lens> lenses() {

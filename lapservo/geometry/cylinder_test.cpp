@@ -8,8 +8,7 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/testing/seeded_random.h"
 
-namespace lapservo::internal {
-namespace cylinder_test {
+namespace lapservo::internal::cylinder_test {
 
 constexpr std::uint64_t seed = 22;
 constexpr double radius_m = 0.0042;
@@ -76,5 +75,4 @@ TEST(Rigid3, InverseAndProductFormAGroup) {
   }
 }
 
-}  // namespace cylinder_test
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::cylinder_test

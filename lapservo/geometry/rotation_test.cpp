@@ -6,8 +6,7 @@
 
 #include "lapservo/testing/seeded_random.h"
 
-namespace lapservo::internal {
-namespace rotation_test {
+namespace lapservo::internal::rotation_test {
 
 constexpr std::uint64_t seed = 31;
 
@@ -47,5 +46,4 @@ TEST(RotationVector, GoesThereAndBackTheShorterWay) {
   }
 }
 
-}  // namespace rotation_test
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::rotation_test

@@ -88,39 +88,6 @@ class PictureSource : public FrameSource {
   std::size_t next_ = 0, low_bits_ = 0;
 };
 
-// A file, or a stream, which is live.
-class VideoSource : public FrameSource {
- public:
-  VideoSource(const std::string& name, VideoReader::Kind kind, const VideoReading& reading)
-      : is_stream_(kind == VideoReader::Kind::stream),
-        video_(name, std::chrono::seconds(is_stream_ ? 30 : 5), kind, reading),
-        first_(video_.next()) {
-    if (!first_)
-      throw InputError(name, is_stream_ ? "gives no frames, expected a stream" : "has no frames, expected a video");
-  }
-
-  std::optional<Frame> next() override {
-    auto image = first_ ? std::exchange(first_, std::nullopt) : video_.next();
-    if (!image) return std::nullopt;
-    Frame frame{std::move(image->bgr), index_++, image->time_s, {}, {}};
-    if (image->damaged) frame.flaw = Status::damaged;
-    return frame;
-  }
-  Kind kind() const override { return is_stream_ ? Kind::live : Kind::video; }
-  std::optional<int> frame_count() const override { return is_stream_ ? std::nullopt : video_.frame_count(); }
-  double frames_per_second() const override { return video_.frames_per_second(); }
-  std::string remark() const override { return video_.remark(); }
-  bool is_srgb() const override { return video_.is_srgb(); }
-  bool is_lossy() const override { return video_.is_lossy(); }
-  std::string complaint() const override { return video_.complaint(); }
-
- private:
-  bool is_stream_;
-  VideoReader video_;
-  std::optional<VideoReader::Image> first_;
-  int index_ = 0;
-};
-
 Pictures pictures_in(const fs::path& folder) {
   std::vector<fs::path> files;
   int unread = 0;
@@ -155,8 +122,7 @@ void refuse_dicom(const fs::path& path) {
 std::unique_ptr<FrameSource> open_frame_source(const std::string& input, double folder_fps,
                                                const VideoReading& reading) {
   using Kind = FrameSource::Kind;
-  if (input.find("://") != std::string::npos)
-    return std::make_unique<VideoSource>(input, VideoReader::Kind::stream, reading);
+  if (input.find("://") != std::string::npos) return open_video(input, Kind::live, reading, std::chrono::seconds(30));
   std::error_code error;
   const bool exists = fs::exists(input, error);
   if (error == std::errc::permission_denied) throw InputError(input, "can't be looked at: " + error.message());
@@ -169,7 +135,7 @@ std::unique_ptr<FrameSource> open_frame_source(const std::string& input, double 
   if (has_image_extension(input) || has_unread_extension(input))
     return std::make_unique<PictureSource>(Kind::image, Pictures{{{input}}}, folder_fps);
   if (!fs::is_regular_file(input)) throw InputError(input, "is no file, expected an image, a folder or a video");
-  return std::make_unique<VideoSource>(input, VideoReader::Kind::file, reading);
+  return open_video(input, Kind::video, reading);
 }
 
 }  // namespace lapservo

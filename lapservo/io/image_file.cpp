@@ -6,21 +6,17 @@
 #include <initializer_list>
 #include <string_view>
 
+#include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
 
 #include "lapservo/core/atomic_file.h"
 #include "lapservo/core/error.h"
 #include "lapservo/core/input_file.h"
 #include "lapservo/core/lower_case.h"
-#include "lapservo/io/pictures/exif_orientation.h"
-#include "lapservo/io/pictures/jpeg_encoding.h"
 #include "lapservo/io/pictures/jpeg_picture.h"
-#include "lapservo/io/pictures/jpeg_segments.h"
 #include "lapservo/io/pictures/libav_picture.h"
-#include "lapservo/io/pictures/picture_count.h"
-#include "lapservo/io/pictures/png_encoding.h"
+#include "lapservo/io/pictures/picture_parts.h"
 #include "lapservo/io/pictures/png_picture.h"
-#include "lapservo/io/tables/numbers.h"
 
 namespace lapservo {
 using namespace internal;
@@ -63,30 +59,19 @@ void check_size(const PictureSize& size, const std::string& source) {
                      "at most 16384 pixels a side");
 }
 
-bool is_png(std::span<const std::uint8_t> bytes) {
-  return text_of(bytes).starts_with("\x89PNG\r\n\x1a\n");
-}
-
-// The bytes that the file says it has.
-std::size_t least_bytes(std::span<const std::uint8_t> bytes, const std::string& format) {
-  constexpr std::size_t riff_header = 8;
-  const Numbers numbers{bytes, false};
-  if (format == "WebP") return riff_header + numbers.of(4, 4);
-  return format == "BMP" ? numbers.of(2, 4) : 0;
-}
-
 // Decoders return half an image for half a file, and fill gigabytes for a few bytes: ask for end and size beforehand.
-void check_whole(std::span<const std::uint8_t> bytes, const std::string& source) {
-  using namespace std::string_view_literals;
-  const std::string_view text = text_of(bytes);
-  if (is_png(bytes)) {
-    if (bytes.size() < 33 || text.rfind("IEND"sv) == std::string_view::npos)
-      throw InputError(source, "is a truncated PNG, expected a whole image");
+void check_whole(std::span<const std::uint8_t> bytes, PictureFormat format, const std::string& source) {
+  const auto need = [&](bool is_whole, const char* name) {
+    if (!is_whole) throw InputError(source, fmt::format("is a truncated {}, expected a whole image", name));
+  };
+  const Numbers numbers{bytes, false};
+  if (format == PictureFormat::png) {
+    need(bytes.size() >= 33 && text_of(bytes).rfind("IEND") != std::string_view::npos, "PNG");
     check_size(png_size(bytes), source);
   }
-  if (is_jpeg(bytes)) check_size(jpeg_header(bytes).size, source);
-  if (const std::string format = libav_format(bytes); bytes.size() < least_bytes(bytes, format))
-    throw InputError(source, "is a truncated " + format + ", expected a whole image");
+  if (format == PictureFormat::jpeg) check_size(jpeg_header(bytes).size, source);
+  if (format == PictureFormat::webp) need(bytes.size() >= 8 + numbers.of(4, 4), "WebP");
+  if (format == PictureFormat::bmp) need(bytes.size() >= numbers.of(2, 4), "BMP");
 }
 
 // "TIFF"; "HEIC" or "AVIF" by the brand that follows the box of the file's type; else empty.
@@ -104,12 +89,17 @@ std::string unread_format(std::span<const std::uint8_t> bytes) {
 void refuse_unread(std::span<const std::uint8_t> bytes, const std::string& source) {
   if (const std::string format = unread_format(bytes); !format.empty())
     throw InputError(source, "is in " + format + ", which is not read: convert it to PNG");
-  if (is_jpeg(bytes) && jpeg_header(bytes).channels == 4)
+  if (picture_format(bytes) == PictureFormat::jpeg && jpeg_header(bytes).channels == 4)
     throw InputError(source, "is a JPEG in CMYK, which is not read: convert it to PNG in RGB");
 }
 
 bool has_extension(const fs::path& path, std::initializer_list<std::string_view> known) {
   return std::find(known.begin(), known.end(), lower_case(path.extension().string())) != known.end();
+}
+
+cv::Mat undamaged(const Picture& picture, const std::string& source) {
+  if (picture.flaw) throw InputError(source, "is damaged, expected a whole image");
+  return picture.bgr;
 }
 
 }  // namespace
@@ -154,7 +144,8 @@ cv::Mat bgr8_from(const cv::Mat& image, const std::string& source) {
 
 Picture decode_picture(std::span<const std::uint8_t> bytes, const std::string& source) {
   if (bytes.empty()) throw InputError(source, "is empty, expected an image");
-  check_whole(bytes, source);
+  const PictureFormat format = picture_format(bytes);
+  check_whole(bytes, format, source);
   if (const std::size_t count = picture_count(bytes); count > 1)
     throw InputError(source,
                      "holds " + std::to_string(count) + " images, expected one: write them into a folder, one a file");
@@ -163,17 +154,18 @@ Picture decode_picture(std::span<const std::uint8_t> bytes, const std::string& s
   if (const auto orientation = exif_orientation(bytes); orientation && *orientation >= 2 && *orientation <= 8)
     throw InputError(source, "EXIF orientation", std::to_string(*orientation),
                      "1: the pixels as the calibrated camera has them, not to be turned");
-  const DecodedPicture decoded = is_png(bytes)    ? decode_png(bytes)
-                                 : is_jpeg(bytes) ? decode_jpeg(bytes)
-                                                  : DecodedPicture{libav_decode(bytes), ""};
-  if (is_jpeg(bytes) && !decoded.complaint.empty() && text_of(bytes).rfind("\xff\xd9") == std::string_view::npos)
+  const bool is_png = format == PictureFormat::png, is_jpeg = format == PictureFormat::jpeg;
+  const DecodedPicture decoded = is_png    ? decode_png(bytes)
+                                 : is_jpeg ? decode_jpeg(bytes)
+                                           : DecodedPicture{libav_decode(bytes), ""};
+  if (is_jpeg && !decoded.complaint.empty() && text_of(bytes).rfind("\xff\xd9") == std::string_view::npos)
     throw InputError(source, "is a truncated JPEG, expected a whole image");
   if (decoded.bgr.empty())
     throw InputError(source, "can't be decoded, expected a PNG, JPEG, BMP, WebP, PPM or PGM image");
   check_size({static_cast<std::uint32_t>(decoded.bgr.cols), static_cast<std::uint32_t>(decoded.bgr.rows)}, source);
   Picture picture{bgr8_from(decoded.bgr, source), std::nullopt};
   constexpr std::size_t png_depth = 24;
-  const bool is_deep = is_png(bytes) ? bytes[png_depth] == 16 : decoded.bgr.depth() == CV_16U;
+  const bool is_deep = is_png ? bytes[png_depth] == 16 : decoded.bgr.depth() == CV_16U;
   constexpr double most_of_12_bits = 16;  // of 255
   picture.low_bits = is_deep && cv::norm(picture.bgr, cv::NORM_INF) <= most_of_12_bits;
   if (!decoded.complaint.empty()) picture.flaw = Status::damaged;
@@ -181,9 +173,7 @@ Picture decode_picture(std::span<const std::uint8_t> bytes, const std::string& s
 }
 
 cv::Mat decode_image(std::span<const std::uint8_t> bytes, const std::string& source) {
-  const Picture picture = decode_picture(bytes, source);
-  if (picture.flaw) throw InputError(source, "is damaged, expected a whole image");
-  return picture.bgr;
+  return undamaged(decode_picture(bytes, source), source);
 }
 
 Picture read_picture(const fs::path& path) {
@@ -192,8 +182,7 @@ Picture read_picture(const fs::path& path) {
 }
 
 cv::Mat read_image(const fs::path& path) {
-  const std::string bytes = read_input(path, max_bytes, "an image");
-  return decode_image({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()}, path.string());
+  return undamaged(read_picture(path), path.string());
 }
 
 void write_image(const fs::path& path, const cv::Mat& image) {

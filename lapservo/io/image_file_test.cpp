@@ -13,8 +13,8 @@
 
 #include "lapservo/core/error.h"
 #include "lapservo/core/random.h"
-#include "lapservo/io/pictures/jpeg_encoding.h"
-#include "lapservo/io/pictures/png_encoding.h"
+#include "lapservo/io/pictures/jpeg_picture.h"
+#include "lapservo/io/pictures/png_picture.h"
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
 #include "lapservo/testing/videos.h"
@@ -137,17 +137,17 @@ TEST(Image, IsRefusedWhereverTheFileIsCut) {
   }
 }
 
-TEST(Image, IsRefusedWhenItIsSomethingElse) {
-  const std::string text = "frame,time_s\n0,0\n";
-  EXPECT_EQ(refusal(Bytes(text.begin(), text.end())), not_decoded);
-  EXPECT_EQ(refusal({}), "p: is empty, expected an image");
-  EXPECT_EQ(input_error([] { bgr8_from(cv::Mat(4, 4, CV_8UC2, cv::Scalar(1, 2)), "p"); }),
-            "p: channels: is 2, expected 1 (grey), 3 or 4 (alpha)");
+Bytes bytes_of(const std::string& text) {
+  return {text.begin(), text.end()};
 }
 
 TEST(Image, OfAFormatThatIsNotReadIsNamed) {
-  const std::string heic = std::string("\0\0\0\x18", 4) + "ftypheic" + std::string(40, '\0');
-  EXPECT_EQ(refusal(Bytes(heic.begin(), heic.end())), "p: is in HEIC, which is not read: convert it to PNG");
+  EXPECT_EQ(refusal(bytes_of("frame,time_s\n0,0\n")), not_decoded);
+  EXPECT_EQ(refusal({}), "p: is empty, expected an image");
+  EXPECT_EQ(input_error([] { bgr8_from(cv::Mat(4, 4, CV_8UC2, cv::Scalar(1, 2)), "p"); }),
+            "p: channels: is 2, expected 1 (grey), 3 or 4 (alpha)");
+  EXPECT_EQ(refusal(bytes_of(std::string("\0\0\0\x18", 4) + "ftypheic" + std::string(40, '\0'))),
+            "p: is in HEIC, which is not read: convert it to PNG");
   for (const Bytes& tiff : {Bytes{'I', 'I', '*', 0, 8, 0}, Bytes{'M', 'M', 0, '*', 0, 0}})
     EXPECT_EQ(refusal(tiff), "p: is in TIFF, which is not read: convert it to PNG");
   Bytes jpeg = encoded(cv::Mat(16, 16, CV_8UC3, cv::Scalar(20, 120, 220)), ".jpg");
@@ -162,10 +162,6 @@ Bytes joined(const std::vector<Bytes>& parts) {
   Bytes all;
   for (const Bytes& part : parts) all.insert(all.end(), part.begin(), part.end());
   return all;
-}
-
-Bytes bytes_of(const std::string& text) {
-  return {text.begin(), text.end()};
 }
 
 TEST(Image, OfSeveralPicturesInOneFileIsRefusedAndCounted) {

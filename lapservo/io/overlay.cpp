@@ -121,6 +121,13 @@ class DrawnMarker {
     return camera_.raw_from_point(camera_from_unrolled_ *
                                   surface_point(marker_.radius_m(), azimuth_rad(across), along_m));
   }
+  void draw(Pen& pen, Style style) const {
+    draw_sides(pen, style);
+    for (std::size_t k = 0; k < 4; ++k) draw_boundary(pen, k, style);
+  }
+
+ private:
+  static constexpr int steps = 48;
   void draw_sides(Pen& pen, Style style) const {
     for (const double side : {-1.0, 1.0}) {
       std::vector<Eigen::Vector2d> line;
@@ -144,9 +151,6 @@ class DrawnMarker {
     }
     stroke(pen, curve, style, boundary_colour);
   }
-
- private:
-  static constexpr int steps = 48;
   double azimuth_rad(double across) const { return view_->facing_azimuth_rad + across * view_->half_visible_rad; }
   static void stroke(Pen& pen, const std::vector<Eigen::Vector2d>& line, Style style, const cv::Scalar& colour) {
     style == Style::found ? pen.polyline(line, colour) : pen.dashes(line, refused_colour);
@@ -159,13 +163,17 @@ class DrawnMarker {
   std::optional<CylinderView> view_;
 };
 
+bool shows(const Camera& camera, const Eigen::Vector2d& px) {
+  return px.x() >= 0 && px.x() < camera.width_px && px.y() >= 0 && px.y() < camera.height_px;
+}
+
 // The RCM's image and r, when it lies in the image.
 void draw_rcm(Pen& pen, const Camera& camera, const Instrument& instrument, const Observation& o) {
   if (!instrument.camera_from_rcm || !(instrument.camera_from_rcm->translation.z() > 0)) return;
   const auto ideal_px = projected_rcm_px(camera, *instrument.camera_from_rcm);
   if (!ideal_px) return;
   const Eigen::Vector2d px = camera.raw_from_ideal(*ideal_px);
-  if (!(px.x() >= 0 && px.x() < camera.width_px && px.y() >= 0 && px.y() < camera.height_px)) return;
+  if (!shows(camera, px)) return;
   pen.dashes({px, o.edges_raw_px[0]}, rcm_colour);
   pen.cross(px, rcm_colour);
   pen.label("RCM", px + Eigen::Vector2d(12, -8) * pen.scale());
@@ -176,7 +184,7 @@ void draw_tip(Pen& pen, const Camera& camera, const Observation::Tip& tip) {
   const Eigen::Vector3d& point = tip.camera_from_tip.translation;
   if (!(point.z() > 0)) return;
   const Eigen::Vector2d px = camera.raw_from_point(point);
-  if (!(px.x() >= 0 && px.x() < camera.width_px && px.y() >= 0 && px.y() < camera.height_px)) return;
+  if (!shows(camera, px)) return;
   const double step_m = 1e-4 * point.z(), chi = std::sqrt(5.991);  // of two degrees of freedom
   Eigen::Matrix<double, 2, 3> slopes;
   for (int i = 0; i < 3; ++i)
@@ -247,8 +255,7 @@ Eigen::Vector2d place_beside(const Pen& pen, const std::array<std::string, 2>& l
 void draw_found(Pen& pen, const Camera& camera, const Instrument& instrument, const Observation& o) {
   const DrawnMarker marker(camera, instrument.marker, o.camera_from_unrolled, o.psi_rad);
   if (!marker.visible()) return;
-  marker.draw_sides(pen, Style::found);
-  for (std::size_t k = 0; k < 4; ++k) marker.draw_boundary(pen, k, Style::found);
+  marker.draw(pen, Style::found);
   draw_rcm(pen, camera, instrument, o);
   if (o.tip) draw_tip(pen, camera, *o.tip);
   const Eigen::Vector2d proximal = o.edges_raw_px[0], distal = o.edges_raw_px[3];
@@ -269,10 +276,7 @@ void draw_refused(Pen& pen, const Camera& camera, const Instrument& instrument, 
   using What = Observation::Refused::What;
   if (refused.what == What::pose) {
     const DrawnMarker marker(camera, instrument.marker, refused.camera_from_unrolled, refused.psi_rad);
-    if (marker.visible()) {
-      marker.draw_sides(pen, Style::refused);
-      for (std::size_t k = 0; k < 4; ++k) marker.draw_boundary(pen, k, Style::refused);
-    }
+    if (marker.visible()) marker.draw(pen, Style::refused);
   }
   if (refused.what == What::edges) {
     pen.dashes({refused.edges_raw_px.front(), refused.edges_raw_px.back()}, refused_colour);

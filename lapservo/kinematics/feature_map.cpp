@@ -55,19 +55,14 @@ Eigen::RowVector4d length_rate(const Eigen::Vector2d& from_to, const PerJoint& r
 
 }  // namespace
 
-FeatureMapResult feature_map(const ImageModel& model, const JointVector& q) {
-  if (!q.vector().allFinite()) return {Undefined::bad_configuration, {}};
+std::optional<FeaturePoint> feature_map(const ImageModel& model, const JointVector& q) {
+  if (!q.vector().allFinite()) return std::nullopt;
   const auto rcm_px = projected_rcm_px(model.camera, model.camera_from_rcm);
-  if (!rcm_px) return {Undefined::rcm_in_focal_plane, {}};
-  const Rigid3 camera_from_unrolled = model.camera_from_rcm * rcm_from_unrolled(q);
-  const auto line = centre_line(model.camera, model.marker, camera_from_unrolled, q.psi_rad);
-  if (!line && view_cylinder(camera_from_unrolled, model.marker.radius_m())) return {Undefined::behind_camera, {}};
-  if (!line) return {Undefined::camera_inside_shaft, {}};
-
+  const auto line = centre_line(model.camera, model.marker, model.camera_from_rcm * rcm_from_unrolled(q), q.psi_rad);
+  if (!rcm_px || !line) return std::nullopt;
   const auto& e = line->ideal_px;
   const Eigen::Vector2d from_rcm = e[0] - *rcm_px, whole = e[3] - e[0], inner = e[2] - e[0];
-  if (!(whole.norm() > min_px && inner.norm() > min_px)) return {Undefined::foreshortened, {}};
-  if (!(from_rcm.norm() > min_px)) return {Undefined::at_projected_rcm, {}};
+  if (!(whole.norm() > min_px && inner.norm() > min_px && from_rcm.norm() > min_px)) return std::nullopt;
 
   const auto rates = edge_rates(model, q, *line);
   const PerJoint whole_rate = rates[3] - rates[0];
@@ -80,7 +75,7 @@ FeatureMapResult feature_map(const ImageModel& model, const JointVector& q) {
   point.ends_jacobian << rates[0], rates[3];
   point.tau_rad = line->tau_rad;
   point.ideal_px = e;
-  return {Undefined::none, point};
+  return point;
 }
 
 }  // namespace lapservo::internal

@@ -19,17 +19,6 @@ struct ImageModel {
   Rigid3 camera_from_rcm;
 };
 
-/// Why a configuration has no image features, or no derivative of them.
-enum class Undefined {
-  none,
-  bad_configuration,    ///< a number of q is not finite
-  rcm_in_focal_plane,   ///< the RCM has no image
-  camera_inside_shaft,  ///< the extended shaft holds the camera centre: no generatrix faces it
-  behind_camera,        ///< a boundary of the marker is not in front of the camera
-  foreshortened,        ///< e0 and e3 coincide in the image (seen along the generatrix): s has no value
-  at_projected_rcm,     ///< e0 lies on the projected RCM: r has a kink there
-};
-
 /// f(q) = [s_rad r_px l_px d_px] and what belongs to it.
 struct FeaturePoint {
   Eigen::Vector4d f = Eigen::Vector4d::Zero();
@@ -41,17 +30,16 @@ struct FeaturePoint {
   std::array<Eigen::Vector2d, 4> ideal_px{};
 };
 
-struct FeatureMapResult {
-  Undefined reason = Undefined::none;
-  std::optional<FeaturePoint> point;  ///< present exactly when reason is none; then every number is finite
-};
-
 /// The feature map (eq. 12-15) with its analytic Jacobian (eq. 20), for surface points on the facing generatrix where
 /// the paper takes points of the axis: gamma moves with theta and phi, so the line on the surface, the azimuth
 /// tau = gamma - psi - seam on the marker and with it the inner boundaries move too. Neither depends on rho.
 ///
 /// d jumps where tau passes the seam (0 = 2 pi), by the difference between the print's upper and lower edge. There the
 /// Jacobian is the one-sided derivative of the side that wrap_two_pi puts tau on (tau = 0: the upper edge).
-FeatureMapResult feature_map(const ImageModel& model, const JointVector& q);
+///
+/// Every number is finite. Nullopt where q is not finite, the RCM has no image, the camera centre lies in the extended
+/// shaft, a boundary of the marker is not in front of the camera, e0 coincides in the image with e3 or e2 (s has no
+/// value) or with the projected RCM (r has a kink).
+std::optional<FeaturePoint> feature_map(const ImageModel& model, const JointVector& q);
 
 }  // namespace lapservo::internal

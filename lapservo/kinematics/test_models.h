@@ -45,9 +45,9 @@ inline JointVector visible_configuration(const ImageModel& model, Random& random
     auto q = configuration_through(model.camera_from_rcm, proximal);
     if (!q || q->rho_m < 0.02 || std::sin(q->phi_rad) < 0.05) continue;
     q->psi_rad = random.uniform(-pi, pi);
-    const auto result = feature_map(model, *q);
-    if (!result.point || result.point->f[2] < 40 || result.point->f[1] < 5) continue;
-    if (model.camera.contains(result.point->ideal_px[0]) && model.camera.contains(result.point->ideal_px[3])) return *q;
+    const auto point = feature_map(model, *q);
+    if (!point || point->f[2] < 40 || point->f[1] < 5) continue;
+    if (model.camera.contains(point->ideal_px[0]) && model.camera.contains(point->ideal_px[3])) return *q;
   }
 }
 

@@ -145,7 +145,6 @@ TEST(FrameTopics, TheTipHasAFrameAndAPose) {
   EXPECT_EQ(frame.frame_from_child, camera_from_tip);
 }
 
-// The pose's covariance is that of poses whose joints are drawn from theirs.
 TEST(FrameTopics, ThePosesCovarianceIsThatOfItsSamples) {
   const Instrument instrument = testing::small_test_rig().instruments.front();
   const Observation::Rcm seen{there, Eigen::Vector4d(1e-6, 2e-6, 1e-8, 4e-6).asDiagonal()};

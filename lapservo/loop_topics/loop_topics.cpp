@@ -14,8 +14,8 @@
 #include "lapservo/core/printable.h"
 #include "lapservo/crtk/joint_map.h"
 #include "lapservo/io/overlay.h"
-#include "lapservo/io/pictures/jpeg_encoding.h"
-#include "lapservo/rig/single_instrument.h"
+#include "lapservo/io/pictures/jpeg_picture.h"
+#include "lapservo/rig/instruments.h"
 #include "lapservo/robot/supervisor_state.h"
 
 namespace lapservo::internal {
@@ -36,9 +36,8 @@ std::vector<std::string> feature_names() {
 template <std::size_t N, typename Matrix>
 std::array<double, N> rows_of(const Matrix& matrix) {
   std::array<double, N> values{};
-  for (Eigen::Index i = 0; i < matrix.rows(); ++i)
-    for (Eigen::Index j = 0; j < matrix.cols(); ++j)
-      values[static_cast<std::size_t>(i * matrix.cols() + j)] = matrix(i, j);
+  auto to = values.begin();
+  for (const auto& row : matrix.rowwise()) to = std::copy(row.begin(), row.end(), to);
   return values;
 }
 

@@ -157,49 +157,44 @@ TEST(LoopTopics, AStartThatIsRepeatedCountsOnce) {
   EXPECT_EQ(loop.hear("command", StringMessage{0, "start"}).starts.size(), 1u);
 }
 
-// By a process that was stopped, or by the network; a stop counts whenever it comes.
-TEST(LoopTopics, AStartOrAGoalThatMayHaveBeenKeptBackDoesNotCount) {
-  Loop loop;
-  const auto expect = [&](bool counts, const std::string& start, double arm_silent_s) {
-    SCOPED_TRACE(start);
-    loop.transport.say("/lapservo/PSM1/set_point", JointMessage{0, names, {0.9, 400, 180, 100}});
-    loop.transport.say("/lapservo/PSM1/command", StringMessage{0, "stop"});
-    const LoopWishes wishes = loop.hear("command", StringMessage{0, start}, arm_silent_s);
-    EXPECT_EQ(wishes.set_point.has_value(), counts);
-    EXPECT_EQ(wishes.starts.size(), counts ? 1u : 0u);
-    EXPECT_EQ(wishes.stops.size(), 1u);
-  };
-  expect(true, "start", 0.3);  // as a network that is slow
-  expect(false, "start force", 0.6);
-  expect(false, "start force", 0);
-  loop.go_on(1.6);
-  expect(true, "start", 0);
-  testing::sleep(0.6);
-  expect(false, "start force", 0);
+// A goal and a start that are said before and after a stop, which counts in any case. Whether nothing is remarked.
+bool expect_to_count(bool counts, Loop& loop, const std::string& start_text, double arm_silent_s,
+                     Latched latched = Latched::no) {
+  SCOPED_TRACE(start_text);
+  JointMessage goal{0, names, {0.9, 400, 180, 100}};
+  StringMessage stop{0, "stop"}, start{0, start_text};
+  goal.latched = stop.latched = start.latched = latched;
+  loop.transport.say("/lapservo/PSM1/set_point", goal);
+  loop.transport.say("/lapservo/PSM1/command", stop);
+  const LoopWishes wishes = loop.hear("command", start, arm_silent_s);
+  EXPECT_EQ(wishes.set_point.has_value(), counts);
+  EXPECT_EQ(wishes.starts.size(), counts ? 1u : 0u);
+  EXPECT_EQ(wishes.stops.size(), 1u);
+  return wishes.remarks.empty();
 }
 
-// ROS 1 repeats it for each connection, however old it is; a stop counts whenever it comes.
+// By a process that was stopped, or by the network.
+TEST(LoopTopics, AStartOrAGoalThatMayHaveBeenKeptBackDoesNotCount) {
+  Loop loop;
+  expect_to_count(true, loop, "start", 0.3);  // as a network that is slow
+  expect_to_count(false, loop, "start force", 0.6);
+  expect_to_count(false, loop, "start force", 0);
+  loop.go_on(1.6);
+  expect_to_count(true, loop, "start", 0);
+  testing::sleep(0.6);
+  expect_to_count(false, loop, "start force", 0);
+}
+
+// ROS 1 repeats it for each connection, however old it is.
 TEST(LoopTopics, ALatchedStartOrGoalCountsWhereItIsNew) {
   Loop loop;
-  const auto expect = [&](bool counts, Latched latched) {
-    JointMessage goal{0, names, {0.9, 400, 180, 100}};
-    StringMessage stop{0, "stop"}, start{0, "start"};
-    goal.latched = stop.latched = start.latched = latched;
-    loop.transport.say("/lapservo/PSM1/set_point", goal);
-    loop.transport.say("/lapservo/PSM1/command", stop);
-    const LoopWishes wishes = loop.hear("command", start);
-    EXPECT_EQ(wishes.set_point.has_value(), counts);
-    EXPECT_EQ(wishes.starts.size(), counts ? 1u : 0u);
-    EXPECT_EQ(wishes.stops.size(), 1u);
-    EXPECT_EQ(wishes.remarks.empty(), counts);
-  };
-  expect(false, Latched::perhaps);  // before the loop begins
-  expect(false, Latched::perhaps);
-  expect(true, Latched::no);
+  EXPECT_FALSE(expect_to_count(false, loop, "start", 0, Latched::perhaps));  // before the loop begins
+  EXPECT_FALSE(expect_to_count(false, loop, "start", 0, Latched::perhaps));
+  EXPECT_TRUE(expect_to_count(true, loop, "start", 0));
   loop.go_on(1.6);
-  expect(true, Latched::perhaps);
+  EXPECT_TRUE(expect_to_count(true, loop, "start", 0, Latched::perhaps));
   loop.go_on(1.6);
-  expect(false, Latched::again);
+  EXPECT_FALSE(expect_to_count(false, loop, "start", 0, Latched::again));
 }
 
 TEST(LoopTopics, KnowsAnotherLoopOfItsName) {

@@ -2,18 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include "lapservo/testing/markers.h"
+
 namespace lapservo::internal {
 namespace {
 
-Marker with_bands(const BandShares& upper_mm, const BandShares& lower_mm) {
-  Marker marker;
-  for (std::size_t i = 0; i < 3; ++i)
-    marker.bands_upper_m[i] = 1e-3 * upper_mm[i], marker.bands_lower_m[i] = 1e-3 * lower_mm[i];
-  return marker;
-}
-
 TEST(BandShares, AMarkerHasItsOwnAtEachAzimuthAndNotThoseOfAnother) {
-  const Marker marker = with_bands({3.5, 3.5, 17}, {10, 10, 4});
+  const Marker marker = testing::marker_with({0.0035, 0.0035, 0.017}, {0.01, 0.01, 0.004});
   for (double tau_rad = 0; tau_rad < 6.28; tau_rad += 0.1) {
     const auto at_m = boundaries_m(marker, tau_rad);
     BandShares shares{};

@@ -3,11 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <stdexcept>
 
-#include "lapservo/core/angles.h"
+#include <fmt/format.h>
+
+#include "lapservo/core/error.h"
 
 namespace lapservo::internal {
 namespace {
@@ -63,11 +64,15 @@ std::string decoding_problem(const Marker& marker) {
   const auto slope = [&](double t) { return c[0] + t * (c[1] + t * c[2]); };
   double turns_at = 0;  // l1 l3 / l2 of positive lengths whose sum is constant has no minimum: it rises, then falls
   while (turns_at < 1 && slope(turns_at) > 0) turns_at += 1.0 / 360;
-  char text[160];
-  std::snprintf(text, sizeof text,
-                "the cross-ratio turns back near tau = %.2f rad, so that two rotations look the same",
-                marker.covered_rad() * turns_at);
-  return text;
+  return fmt::format("the cross-ratio turns back near tau = {:.2f} rad, so that two rotations look the same",
+                     marker.covered_rad() * turns_at);
+}
+
+const Marker& decodable(const Marker& marker, std::string_view source) {
+  if (const auto problem = marker_problem(marker)) throw InputError(source, *problem);
+  if (const std::string problem = decoding_problem(marker); !problem.empty())
+    throw InputError(source, "not decodable: " + problem);
+  return marker;
 }
 
 CrossRatioDecoder::CrossRatioDecoder(const Marker& marker) : marker_(marker) {

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <string>
+#include <string_view>
 
 #include "lapservo/marker/marker.h"
 
@@ -28,6 +29,9 @@ class CrossRatioDecoder {
 
 /// Empty when the cross-ratio runs strictly monotonically over tau; else why and where it does not.
 std::string decoding_problem(const Marker& marker);
+
+/// Returns the marker; throws InputError naming `source` for what is none (marker_problem) or can't be decoded.
+const Marker& decodable(const Marker& marker, std::string_view source);
 
 /// tau in [0, covered_rad()] from the length of band 0, 1 or 2 along the shaft (eq. 16). The length must be known in
 /// metres, and an image shows lengths only as well as depth and inclination are known: trackers read the cross-ratio

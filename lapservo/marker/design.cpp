@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
-#include <optional>
 #include <string>
+
+#include <fmt/format.h>
 
 #include "lapservo/core/angles.h"
 #include "lapservo/core/error.h"
@@ -40,12 +40,6 @@ Marker marker_of(const DesignSpec& spec, double length_m, const Choice& choice) 
 
 double min_band(const Marker& marker) {
   return std::min(std::ranges::min(marker.bands_upper_m), std::ranges::min(marker.bands_lower_m));
-}
-
-std::string millimetres(double length_m) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.1f mm", 1e3 * length_m);
-  return text;
 }
 
 // Best of a grid around a choice. The sums are rounded here, and not at the end, so that the limits hold after it and
@@ -103,12 +97,10 @@ Marker design_marker(const DesignSpec& spec) {
   const double min_m = spec.min_band_m.value_or(std::max(0.003, 12 / spec.viewing.px_per_m()));
   const auto marker = least_sigma_marker(spec, length_m, min_m);
   if (!marker)
-    throw InputError("length", "no marker: three bands of at least " + millimetres(min_m) +
-                                   " that change over the turn do not fit into " + millimetres(length_m));
-  if (const auto problem = marker_problem(*marker)) throw InputError("marker", *problem);
-  if (const std::string problem = decoding_problem(*marker); !problem.empty())
-    throw InputError("marker", "not decodable: " + problem);
-  return *marker;
+    throw InputError("length", fmt::format("no marker: three bands of at least {:.1f} mm that change over the turn do "
+                                           "not fit into {:.1f} mm",
+                                           1e3 * min_m, 1e3 * length_m));
+  return decodable(*marker, "marker");
 }
 
 }  // namespace lapservo

@@ -14,8 +14,7 @@
 #include "lapservo/testing/markers.h"
 #include "lapservo/testing/seeded_random.h"
 
-namespace lapservo::internal {
-namespace design_test {
+namespace lapservo::internal::design_test {
 using testing::marker_with;
 
 constexpr std::uint64_t seed = 47;
@@ -122,5 +121,4 @@ TEST(DesignMarker, MinimisesThePrintsErrorsWithTheNoise) {
   EXPECT_TRUE(in_linear_family(by_both));
 }
 
-}  // namespace design_test
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::design_test

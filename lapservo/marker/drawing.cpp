@@ -6,8 +6,9 @@
 #include <cairo.h>
 #include <cmath>
 #include <cstddef>
+#include <memory>
 #include <ostream>
-#include <string>
+#include <type_traits>
 #include <vector>
 
 #include <fmt/format.h>
@@ -33,6 +34,14 @@ cairo_status_t write_to_stream(void* stream, const unsigned char* bytes, unsigne
   return CAIRO_STATUS_SUCCESS;  // the stream reports errors at the end
 }
 
+// What cairo made, which `destroy` frees.
+template <typename Made, void (*destroy)(Made*)>
+using Owned = std::unique_ptr<Made, std::integral_constant<void (*)(Made*), destroy>>;
+
+std::vector<PointMm> rectangle(PointMm from, PointMm to) {
+  return {from, {to.x, from.y}, to, {from.x, to.y}};
+}
+
 // A page in millimetres, y down, written as SVG, PDF or PNG by the name's ending; appears when finish()ed (see
 // AtomicFile).
 class Canvas {
@@ -41,78 +50,73 @@ class Canvas {
     const std::string extension = path.extension().string();
     double unit = 1;
     if (extension == ".svg") {
-      surface_ = cairo_svg_surface_create_for_stream(write_to_stream, &file_.stream(), width_mm, height_mm);
-      cairo_svg_surface_set_document_unit(surface_, CAIRO_SVG_UNIT_MM);
+      surface_.reset(cairo_svg_surface_create_for_stream(write_to_stream, &file_.stream(), width_mm, height_mm));
+      cairo_svg_surface_set_document_unit(surface_.get(), CAIRO_SVG_UNIT_MM);
     } else if (extension == ".pdf") {
       unit = points_per_mm;
-      surface_ =
-          cairo_pdf_surface_create_for_stream(write_to_stream, &file_.stream(), width_mm * unit, height_mm * unit);
-      cairo_pdf_surface_restrict_to_version(surface_, CAIRO_PDF_VERSION_1_4);  // which every printer reads
+      surface_.reset(
+          cairo_pdf_surface_create_for_stream(write_to_stream, &file_.stream(), width_mm * unit, height_mm * unit));
+      cairo_pdf_surface_restrict_to_version(surface_.get(), CAIRO_PDF_VERSION_1_4);  // which every printer reads
       // Without a date the same marker gives the same bytes.
-      cairo_pdf_surface_set_metadata(surface_, CAIRO_PDF_METADATA_CREATE_DATE, nullptr);
+      cairo_pdf_surface_set_metadata(surface_.get(), CAIRO_PDF_METADATA_CREATE_DATE, nullptr);
     } else if (extension == ".png") {
       unit = png_px_per_mm;
       png_ = true;
-      surface_ = cairo_image_surface_create(CAIRO_FORMAT_RGB24, static_cast<int>(width_mm * unit),
-                                            static_cast<int>(height_mm * unit));
+      surface_.reset(cairo_image_surface_create(CAIRO_FORMAT_RGB24, static_cast<int>(width_mm * unit),
+                                                static_cast<int>(height_mm * unit)));
     } else {
       throw InputError(path.string(), "name", extension.empty() ? "without an ending" : extension,
                        "one that ends in .svg, .pdf or .png");
     }
-    cairo_ = cairo_create(surface_);
-    if (cairo_surface_status(surface_) != CAIRO_STATUS_SUCCESS) {
-      cairo_destroy(cairo_);
-      cairo_surface_destroy(surface_);
-      throw InputError(path.string(), "can't be drawn");
-    }
-    cairo_scale(cairo_, unit, unit);
-    polygon({{0, 0}, {width_mm, 0}, {width_mm, height_mm}, {0, height_mm}}, {1, 1, 1});
+    cairo_.reset(cairo_create(surface_.get()));
+    expect_success();
+    cairo_scale(cairo_.get(), unit, unit);
+    polygon(rectangle({0, 0}, {width_mm, height_mm}), {1, 1, 1});
   }
-  ~Canvas() {
-    if (cairo_) cairo_destroy(cairo_);
-    if (surface_) cairo_surface_destroy(surface_);
-  }
-  Canvas(const Canvas&) = delete;
-  Canvas& operator=(const Canvas&) = delete;
 
   void polygon(const std::vector<PointMm>& points, const PrintColour& fill) {
-    cairo_new_path(cairo_);
-    cairo_set_source_rgb(cairo_, fill.r, fill.g, fill.b);
-    for (const PointMm& p : points) cairo_line_to(cairo_, p.x, p.y);
-    cairo_close_path(cairo_);
-    cairo_fill(cairo_);
+    cairo_new_path(cairo_.get());
+    cairo_set_source_rgb(cairo_.get(), fill.r, fill.g, fill.b);
+    for (const PointMm& p : points) cairo_line_to(cairo_.get(), p.x, p.y);
+    cairo_close_path(cairo_.get());
+    cairo_fill(cairo_.get());
   }
 
   void line(const std::vector<PointMm>& points, const PrintColour& colour, double width_mm, bool dashed = false) {
-    cairo_new_path(cairo_);  // text leaves a current point behind
-    cairo_set_source_rgb(cairo_, colour.r, colour.g, colour.b);
-    cairo_set_line_width(cairo_, width_mm);
+    cairo_new_path(cairo_.get());  // text leaves a current point behind
+    cairo_set_source_rgb(cairo_.get(), colour.r, colour.g, colour.b);
+    cairo_set_line_width(cairo_.get(), width_mm);
     const double dash[] = {1.0, 1.0};
-    cairo_set_dash(cairo_, dash, dashed ? 2 : 0, 0);
-    for (const PointMm& p : points) cairo_line_to(cairo_, p.x, p.y);
-    cairo_stroke(cairo_);
+    cairo_set_dash(cairo_.get(), dash, dashed ? 2 : 0, 0);
+    for (const PointMm& p : points) cairo_line_to(cairo_.get(), p.x, p.y);
+    cairo_stroke(cairo_.get());
+  }
+
+  void outline(std::vector<PointMm> corners, const PrintColour& colour, double width_mm, bool dashed) {
+    corners.push_back(corners.front());
+    line(corners, colour, width_mm, dashed);
   }
 
   // How far a text of this height reaches.
   double text_width_mm(const std::string& text, double height_mm) {
-    cairo_select_font_face(cairo_, "sans-serif", CAIRO_FONT_SLANT_NORMAL, CAIRO_FONT_WEIGHT_NORMAL);
-    cairo_set_font_size(cairo_, height_mm * 1.35);
+    cairo_select_font_face(cairo_.get(), "sans-serif", CAIRO_FONT_SLANT_NORMAL, CAIRO_FONT_WEIGHT_NORMAL);
+    cairo_set_font_size(cairo_.get(), height_mm * 1.35);
     cairo_text_extents_t extents;
-    cairo_text_extents(cairo_, text.c_str(), &extents);
+    cairo_text_extents(cairo_.get(), text.c_str(), &extents);
     return extents.x_advance;
   }
 
   enum class Anchor { left, middle, right };
   void text(const std::string& text, PointMm at, double height_mm, Anchor anchor = Anchor::left, double turn_deg = 0) {
     const double width_mm = text_width_mm(text, height_mm);
-    cairo_set_source_rgb(cairo_, 0, 0, 0);
+    cairo_set_source_rgb(cairo_.get(), 0, 0, 0);
     const double fraction = anchor == Anchor::left ? 0 : (anchor == Anchor::middle ? 0.5 : 1);
-    cairo_save(cairo_);
-    cairo_translate(cairo_, at.x, at.y);
-    cairo_rotate(cairo_, rad_from_deg(turn_deg));
-    cairo_move_to(cairo_, -fraction * width_mm, 0);
-    cairo_show_text(cairo_, text.c_str());
-    cairo_restore(cairo_);
+    cairo_save(cairo_.get());
+    cairo_translate(cairo_.get(), at.x, at.y);
+    cairo_rotate(cairo_.get(), rad_from_deg(turn_deg));
+    cairo_move_to(cairo_.get(), -fraction * width_mm, 0);
+    cairo_show_text(cairo_.get(), text.c_str());
+    cairo_restore(cairo_.get());
   }
 
   void arrow(PointMm from, PointMm to) {
@@ -126,17 +130,22 @@ class Canvas {
   }
 
   void finish() {
-    if (png_) cairo_surface_write_to_png_stream(surface_, write_to_stream, &file_.stream());
-    cairo_surface_finish(surface_);
-    if (cairo_surface_status(surface_) != CAIRO_STATUS_SUCCESS) throw InputError(path_.string(), "can't be drawn");
+    if (png_) cairo_surface_write_to_png_stream(surface_.get(), write_to_stream, &file_.stream());
+    cairo_surface_finish(surface_.get());
+    expect_success();
     file_.commit();
   }
 
  private:
+  void expect_success() const {
+    if (cairo_surface_status(surface_.get()) != CAIRO_STATUS_SUCCESS)
+      throw InputError(path_.string(), "can't be drawn");
+  }
+
   std::filesystem::path path_;
   AtomicFile file_;
-  cairo_surface_t* surface_ = nullptr;
-  cairo_t* cairo_ = nullptr;
+  Owned<cairo_surface_t, cairo_surface_destroy> surface_;
+  Owned<cairo_t, cairo_destroy> cairo_;
   bool png_ = false;
 };
 
@@ -197,19 +206,11 @@ void label_tab(Canvas& canvas, const std::string& instrument, PointMm corner, do
 
 void draw_copy(Canvas& canvas, const std::string& instrument, const Marker& marker, PointMm corner) {
   const double length = length_mm(marker), width = width_mm(marker);
-  canvas.polygon({{corner.x, corner.y + width},
-                  {corner.x + length, corner.y + width},
-                  {corner.x + length, corner.y + width + tab_mm},
-                  {corner.x, corner.y + width + tab_mm}},
-                 pale);
+  const PointMm tab{corner.x, corner.y + width}, end{corner.x + length, tab.y + tab_mm};
+  canvas.polygon(rectangle(tab, end), pale);
   draw_bands(canvas, marker, corner, width, 1e3);
-  canvas.line({corner,
-               {corner.x + length, corner.y},
-               {corner.x + length, corner.y + width + tab_mm},
-               {corner.x, corner.y + width + tab_mm},
-               corner},
-              grey, 0.1, true);
-  label_tab(canvas, instrument, {corner.x, corner.y + width}, length);
+  canvas.outline(rectangle(corner, end), grey, 0.1, true);
+  label_tab(canvas, instrument, tab, length);
 }
 
 void draw_curve(Canvas& canvas, PointMm corner, double width, double height, const std::vector<double>& values,
@@ -292,8 +293,7 @@ void write_marker_picture(const std::filesystem::path& path, const std::string& 
   fitting_text(canvas, fmt::format("{}: the marker unrolled, print towards you, tip on the right", instrument),
                {left, 10}, 2.6, plot_width);
   draw_bands(canvas, marker, {left, 16}, height, scale);
-  canvas.line({{left, 16}, {left + length, 16}, {left + length, 16 + height}, {left, 16 + height}, {left, 16}}, black,
-              0.2);
+  canvas.outline(rectangle({left, 16}, {left + length, 16 + height}), black, 0.2, false);
   for (int quarter = 0; quarter <= 4; ++quarter)
     canvas.text(fmt::format("{} deg", 90 * quarter), {left - 1.5, 16 + height * quarter / 4 + 0.8}, 2, Anchor::right);
   canvas.text("tau", {left - 16, 16 + height / 2}, 2.4, Anchor::middle, -90);

@@ -13,8 +13,7 @@
 #include "lapservo/testing/markers.h"
 #include "lapservo/testing/seeded_random.h"
 
-namespace lapservo::internal {
-namespace sensitivity_test {
+namespace lapservo::internal::sensitivity_test {
 using testing::marker_with;
 
 const Marker linear = marker_with({0.0035, 0.0035, 0.017}, {0.0095, 0.0095, 0.005});
@@ -97,21 +96,6 @@ TEST(PredictedSigma, OfTheSurfaceIsThatOfItsLeastSquaresFit) {
           << "tau " << tau_rad;
 }
 
-TEST(PredictedSigma, GrowsWithNoiseAndDistanceAndFallsWithFocalLength) {
-  const Viewing viewing{1100, 0.11, 0.1}, noisy{1100, 0.11, 0.3}, far_away{1100, 0.22, 0.1}, as_far{2200, 0.22, 0.1};
-  for (const double tau_rad : {0.3, 2.0, 5.0}) {
-    const double line = predicted_sigma_centre_line_rad(linear, tau_rad, viewing);
-    EXPECT_NEAR(predicted_sigma_centre_line_rad(linear, tau_rad, noisy), 3 * line, 1e-12);
-    EXPECT_NEAR(predicted_sigma_centre_line_rad(linear, tau_rad, far_away), 2 * line, 1e-12);
-    EXPECT_NEAR(predicted_sigma_centre_line_rad(linear, tau_rad, as_far), line, 1e-12);
-    const double surface = predicted_sigma_surface_rad(linear, tau_rad, viewing);
-    EXPECT_NEAR(predicted_sigma_surface_rad(linear, tau_rad, noisy), 3 * surface, 1e-12);
-    // Half the size and half the lines; more are lost to the seam.
-    EXPECT_NEAR(predicted_sigma_surface_rad(linear, tau_rad, far_away) / surface, 2 * std::sqrt(2), 0.2);
-    EXPECT_NEAR(predicted_sigma_surface_rad(linear, tau_rad, as_far), surface, 1e-12);
-  }
-}
-
 TEST(PredictedPrintError, IsTheSpreadOverRandomPrints) {
   const CrossRatioDecoder decoder(linear);
   constexpr double error_m = 2e-6, fraction = 0.4;
@@ -131,5 +115,4 @@ TEST(PredictedPrintError, IsTheSpreadOverRandomPrints) {
   EXPECT_NEAR(std::sqrt(square) / predicted_print_error_rad(linear, tau_rad, error_m), 1, 0.05);
 }
 
-}  // namespace sensitivity_test
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::sensitivity_test

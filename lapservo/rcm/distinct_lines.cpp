@@ -26,44 +26,32 @@ struct Position {
   Eigen::Matrix4d covariance_px2;
 };
 
-class Positions {
- public:
-  explicit Positions(double apart_px) : apart_px_(apart_px) {}
-
-  void add(const Position& one) {
-    const Cell cell = cell_of(one.first);
+// Each joined with the first one that is near, which lies in its cell or in one of those around it.
+std::vector<Position> merged(const std::vector<Position>& positions, double apart_px) {
+  std::vector<Position> all;
+  std::unordered_map<Cell, std::vector<std::size_t>, CellHash> by_cell;
+  const auto find_near = [&](const Ends& ends, const Cell& cell) -> Position* {
+    for (int n = 0; n < 81; ++n) {
+      const Cell around{cell[0] + n % 3 - 1, cell[1] + n / 3 % 3 - 1, cell[2] + n / 9 % 3 - 1, cell[3] + n / 27 - 1};
+      const auto found = by_cell.find(around);
+      if (found == by_cell.end()) continue;
+      for (const std::size_t i : found->second)
+        if ((all[i].first - ends).cwiseAbs().maxCoeff() < apart_px) return &all[i];
+    }
+    return nullptr;
+  };
+  for (const Position& one : positions) {
+    Cell cell;
+    for (std::size_t i = 0; i < 4; ++i) cell[i] = static_cast<std::int64_t>(std::floor(one.first[i] / apart_px));
     if (Position* near = find_near(one.first, cell)) {
       near->sum += one.sum, near->count += one.count;
     } else {
-      by_cell_[cell].push_back(all_.size());
-      all_.push_back(one);
+      by_cell[cell].push_back(all.size());
+      all.push_back(one);
     }
   }
-  const std::vector<Position>& all() const { return all_; }
-
- private:
-  Cell cell_of(const Ends& ends) const {
-    Cell cell;
-    for (Eigen::Index i = 0; i < 4; ++i)
-      cell[static_cast<std::size_t>(i)] = static_cast<std::int64_t>(std::floor(ends[i] / apart_px_));
-    return cell;
-  }
-  // In its cell and those around it.
-  Position* find_near(const Ends& ends, const Cell& cell) {
-    for (int n = 0; n < 81; ++n) {
-      const Cell around{cell[0] + n % 3 - 1, cell[1] + n / 3 % 3 - 1, cell[2] + n / 9 % 3 - 1, cell[3] + n / 27 - 1};
-      const auto found = by_cell_.find(around);
-      if (found == by_cell_.end()) continue;
-      for (const std::size_t i : found->second)
-        if ((all_[i].first - ends).cwiseAbs().maxCoeff() < apart_px_) return &all_[i];
-    }
-    return nullptr;
-  }
-
-  double apart_px_;
-  std::vector<Position> all_;
-  std::unordered_map<Cell, std::vector<std::size_t>, CellHash> by_cell_;
-};
+  return all;
+}
 
 }  // namespace
 
@@ -78,9 +66,7 @@ std::vector<LineObservation> distinct_lines(std::span<const LineObservation> lin
     positions.push_back({ends, ends, 1, line.covariance_px2});
   }
   do {
-    Positions merged(apart_px);
-    for (const Position& position : positions) merged.add(position);
-    positions = merged.all();
+    positions = merged(positions, apart_px);
     apart_px *= 1.5;
   } while (positions.size() > most);
   std::vector<LineObservation> distinct;

@@ -1,6 +1,6 @@
 #include "lapservo/rcm/line_observation.h"
 
-#include <limits>
+#include <cmath>
 
 #include <gtest/gtest.h>
 
@@ -21,12 +21,11 @@ TEST(LineObservation, LinesThroughAPointMeetThere) {
 }
 
 TEST(LineObservation, ToldApartFromWhatIsNone) {
-  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_TRUE(is_usable(line_between({0, 0}, {100, 50}, 1)));
   EXPECT_FALSE(is_usable(line_between({7, 7}, {7, 7}, 1)));
-  EXPECT_FALSE(is_usable(line_between({nan, 0}, {100, 50}, 1)));
+  EXPECT_FALSE(is_usable(line_between({NAN, 0}, {100, 50}, 1)));
   EXPECT_FALSE(is_usable(line_between({0, 0}, {1e200, 50}, 1)));
-  EXPECT_FALSE(is_usable(line_between({0, 0}, {100, 50}, nan)));
+  EXPECT_FALSE(is_usable(line_between({0, 0}, {100, 50}, NAN)));
 }
 
 }  // namespace

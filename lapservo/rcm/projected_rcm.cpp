@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <iterator>
 #include <limits>
 #include <utility>
 
@@ -169,15 +170,18 @@ Eigen::Matrix2d common_covariance(const Lines& lines, const Eigen::Vector2d& o, 
   return shift * shift.transpose();
 }
 
+// In rising order.
+Eigen::Vector2d eigenvalues(const Eigen::Matrix2d& matrix) {
+  return Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>().computeDirect(matrix, Eigen::EigenvaluesOnly).eigenvalues();
+}
+
 double direction_spread_rad(const Lines& lines) {
   Eigen::Matrix2d mean = Eigen::Matrix2d::Zero();
   for (const LineObservation& line : lines) {
     const Eigen::Vector2d along = (line.to_px - line.from_px).normalized();
     mean += along * along.transpose() / static_cast<double>(lines.size());
   }
-  const double across =
-      Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>().computeDirect(mean, Eigen::EigenvaluesOnly).eigenvalues()[0];
-  return std::asin(std::sqrt(std::clamp(across, 0.0, 1.0)));
+  return std::asin(std::sqrt(std::clamp(eigenvalues(mean)[0], 0.0, 1.0)));
 }
 
 // From the observed points to o; within the image of the shafts their length stands in.
@@ -198,38 +202,6 @@ bool is_beyond_noise(const RobustFit& robust) {
   const double freedom = inside - 2, part = 2 / (9 * std::max(1.0, freedom));
   return freedom > 0 && robust.fit.chi2 > freedom * std::pow(1 - part + 3 * std::sqrt(part), 3);
 }
-
-// How the lines' misses move with the point, and what a steady motion of the point adds from the first line to the last
-// (px): it lies as far from the middle of the motion as the other lines' do, rms, so that sigma counts the motion.
-struct Slopes {
-  Eigen::VectorXd sigmas;
-  Eigen::MatrixXd by_point, by_motion;
-
-  Slopes(const Lines& lines, const Eigen::Vector2d& o) {
-    const auto count = static_cast<Eigen::Index>(lines.size());
-    sigmas.resize(count), by_point.resize(count, 2), by_motion.resize(count, 2);
-    for (Eigen::Index i = 0; i < count; ++i) {
-      const Miss m = miss(lines[static_cast<std::size_t>(i)], o);
-      const double time = (static_cast<double>(i) + 0.5) / static_cast<double>(count);
-      sigmas[i] = m.sigmas, by_point.row(i) = m.d_sigmas_d_o.transpose();
-      by_motion.row(i) = (time - 0.5 - 1 / std::sqrt(12.0)) * m.d_sigmas_d_o.transpose();
-    }
-  }
-};
-
-// The likeliest motion, and its covariance for misses of unit noise.
-struct Motion {
-  Eigen::Vector2d px;
-  Eigen::Matrix2d covariance_px2;
-
-  explicit Motion(const Slopes& at) {
-    Eigen::MatrixXd both(at.sigmas.size(), 4);
-    both << at.by_point, at.by_motion;
-    const Eigen::MatrixXd covariance = inverse_of_symmetric(product(both.transpose(), both));
-    px = -product(covariance, product(both.transpose(), at.sigmas)).bottomRows(2);
-    covariance_px2 = covariance.bottomRightCorner(2, 2);
-  }
-};
 
 // Slopes of each line's miss by the bend at the border of the observed points, and by the distance of the first and of
 // the second ends from the lines (px).
@@ -277,38 +249,38 @@ std::string text_of(const Fault& fault) {
 void count_departures(const Lines& lines, RcmEstimate& estimate) {
   constexpr std::size_t enough = 12;
   if (lines.size() < enough) return;
-  const Slopes at(lines, estimate.point_px);
+  // How the lines' misses move with the point, and what a steady motion of the point adds from the first line to the
+  // last (px): it lies as far from the middle of the motion as the other lines' do, rms, so that sigma counts the
+  // motion.
+  Eigen::VectorXd sigmas(lines.size());
+  Eigen::MatrixXd slopes(lines.size(), 4);
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    const Miss m = miss(lines[i], estimate.point_px);
+    const double time = (static_cast<double>(i) + 0.5) / static_cast<double>(lines.size());
+    sigmas[i] = m.sigmas;
+    slopes.row(i) << m.d_sigmas_d_o.transpose(), (time - 0.5 - 1 / std::sqrt(12.0)) * m.d_sigmas_d_o.transpose();
+  }
+  // The likeliest motion, and its covariance for misses of unit noise.
+  const Eigen::MatrixXd covariance = inverse_of_symmetric(product(slopes.transpose(), slopes));
+  const Eigen::Vector2d motion_px = -product(covariance, product(slopes.transpose(), sigmas)).bottomRows(2);
+  const Eigen::Matrix2d motion_covariance_px2 = covariance.bottomRightCorner(2, 2);
   LinearFit fit;
-  fit.residuals = at.sigmas, fit.jacobian = at.by_point.sparseView();
+  fit.residuals = sigmas, fit.jacobian = slopes.leftCols(2).sparseView();
   fit.noise = std::max(1e-9, estimate.noise_factor);
-  Eigen::MatrixXd slopes(at.sigmas.size(), 4);
-  const Motion motion(at);
-  slopes << product(at.by_motion, motion.px.normalized()), slopes_by_ends(lines, estimate.point_px);
+  slopes << product(slopes.rightCols(2), motion_px.normalized()), slopes_by_ends(lines, estimate.point_px);
   const Departures departures = departures_of(fit, slopes);
   *estimate.covariance_px2 += departures.by_seen + departures.by_instead;
   for (const Fault& fault : departures.seen) {
     estimate.faults.push_back(text_of(fault));
     // In which direction it moves is not known either.
-    if (fault.which == 0) *estimate.covariance_px2 += fit.noise * fit.noise * motion.covariance_px2 / 12;
+    if (fault.which == 0) *estimate.covariance_px2 += fit.noise * fit.noise * motion_covariance_px2 / 12;
   }
 }
-
-double larger_sigma(const Eigen::Matrix2d& covariance) {
-  return std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>()
-                       .computeDirect(covariance, Eigen::EigenvaluesOnly)
-                       .eigenvalues()[1]);
-}
-
-constexpr Words<RcmStatus, 4> status_words{{{RcmStatus::ok, "ok"},
-                                            {RcmStatus::too_few_lines, "too_few_lines"},
-                                            {RcmStatus::parallel, "parallel"},
-                                            {RcmStatus::not_converged, "not_converged"}}};
-static_assert(names_all(status_words, RcmStatus::not_converged));
 
 }  // namespace
 
 std::string_view to_string(RcmStatus status) {
-  return word_of(status_words, status);
+  return word_of(names_up_to<RcmStatus::not_converged>, status);
 }
 
 RcmEstimate estimate_projected_rcm(std::span<const LineObservation> given, const RcmOptions& options) {
@@ -317,12 +289,7 @@ RcmEstimate estimate_projected_rcm(std::span<const LineObservation> given, const
   RcmEstimate estimate;
   estimate.used.assign(given.size(), false);
   Lines lines;
-  std::vector<std::size_t> place;  // of each usable line among those given
-  for (std::size_t i = 0; i < given.size(); ++i) {
-    if (!is_usable(given[i])) continue;
-    lines.push_back(given[i]);
-    place.push_back(i);
-  }
+  std::copy_if(given.begin(), given.end(), std::back_inserter(lines), is_usable);
   estimate.lines = lines.size();
   if (lines.size() < 2) return estimate;
   const auto start = min_median_start(lines);
@@ -340,10 +307,9 @@ RcmEstimate estimate_projected_rcm(std::span<const LineObservation> given, const
     return estimate;
   }
   Lines inside;
-  for (std::size_t i = 0; i < lines.size(); ++i) {
-    if (!used[i]) continue;
-    estimate.used[place[i]] = true;
-    inside.push_back(lines[i]);
+  for (std::size_t i = 0, usable = 0; i < given.size(); ++i) {
+    estimate.used[i] = is_usable(given[i]) && used[usable++];
+    if (estimate.used[i]) inside.push_back(given[i]);
   }
   estimate.outliers = lines.size() - inside.size();
   estimate.point_px = best.point_px;
@@ -359,8 +325,9 @@ RcmEstimate estimate_projected_rcm(std::span<const LineObservation> given, const
   if (beyond && estimate.faults.empty())
     estimate.faults.push_back(fmt::format(
         "the lines miss one another by {:.2g} times their own sigmas, which are too small", estimate.noise_factor));
-  const double fraction =
-      estimate.covariance_px2 ? larger_sigma(*estimate.covariance_px2) / lever_px(inside, best.point_px) : 0;
+  const double fraction = estimate.covariance_px2
+                              ? std::sqrt(eigenvalues(*estimate.covariance_px2)[1]) / lever_px(inside, best.point_px)
+                              : 0;
   estimate.near_parallel = estimate.direction_spread_rad < near_parallel_rad || fraction > near_parallel_fraction;
   const bool parallel = !(fraction < 1) || estimate.direction_spread_rad < parallel_rad;
   estimate.status = parallel ? RcmStatus::parallel : RcmStatus::ok;

@@ -8,9 +8,10 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "lapservo/core/atomic_file.h"
-#include "lapservo/io/pictures/jpeg_encoding.h"
+#include "lapservo/io/pictures/jpeg_picture.h"
 
 namespace lapservo::internal {
 namespace {
@@ -118,13 +119,13 @@ std::string row_of(const std::vector<std::string>& cells, const char* tag) {
   return text + "</tr>\n";
 }
 
-std::string html_from(const Table& table) {
+// `rows`: as HTML, beside those of the table.
+std::string html_from(const Table& table, std::string rows = "") {
   std::string text =
       table.words ? "<div class=\"scroll\"><table class=\"words\">\n" : "<div class=\"scroll\"><table>\n";
   if (!table.caption.empty()) text += fmt::format("<caption>{}</caption>\n", escaped(table.caption));
-  text += "<thead>" + row_of(table.header, "th") + "</thead>\n<tbody>\n";
-  for (const auto& row : table.rows) text += row_of(row, "td");
-  return text + "</tbody></table></div>\n";
+  for (const auto& row : table.rows) rows += row_of(row, "td");
+  return text + "<thead>" + row_of(table.header, "th") + "</thead>\n<tbody>\n" + rows + "</tbody></table></div>\n";
 }
 
 std::string or_dash(const std::string& text) {
@@ -144,11 +145,12 @@ std::string rows_of(const std::vector<Comparison>& comparisons) {
 }
 
 std::string comparison_table(const std::string& rows) {
-  return "<div class=\"scroll\"><table class=\"words\">\n<thead>" +
-         row_of(
-             {"", "the paper (a real robot)", "the paper\u2019s method here (rendered)", "the default here (rendered)"},
-             "th") +
-         "</thead>\n<tbody>\n" + rows + "</tbody></table></div>\n";
+  return html_from(
+      Table{"",
+            {"", "the paper (a real robot)", "the paper\u2019s method here (rendered)", "the default here (rendered)"},
+            {},
+            true},
+      rows);
 }
 
 std::string warning(const std::string& text) {
@@ -183,9 +185,8 @@ std::string html_from(const ReportSection& section) {
     html += "</ul>\n";
   }
   if (!section.command.empty()) html += "<h3>To make it again</h3>\n<pre>" + escaped(section.command) + "</pre>\n";
-  std::string files;
-  for (const std::string& file : section.files) files += (files.empty() ? "" : ", ") + file;
-  if (!files.empty()) html += "<p>The data behind it, beside this file: " + escaped(files) + "</p>\n";
+  if (const std::string files = fmt::format("{}", fmt::join(section.files, ", ")); !files.empty())
+    html += "<p>The data behind it, beside this file: " + escaped(files) + "</p>\n";
   return html + "</section>\n";
 }
 

@@ -36,8 +36,16 @@ struct Scale {
   bool drawable(double v) const { return std::isfinite(v) && (!logarithmic || v > 0); }
 };
 
+struct LegendEntry {
+  const Series* series;  // null for a reference line
+  std::string name;
+  double x_px, y_px;
+};
+
+// Where everything goes.
 struct Layout {
-  double left_px, top_px;
+  std::vector<LegendEntry> legend;
+  double height_px, left_px, top_px, bottom_edge_px;
   Scale x, y;
 };
 
@@ -208,12 +216,7 @@ std::string drawn(const Plot& plot, const Layout& layout, const Series& series) 
   return text + (has_points(series.draw) ? points_of(plot, layout, series) : hover_points_of(plot, layout, series));
 }
 
-// Where each entry of the legend goes: rows above the plot.
-struct LegendEntry {
-  const Series* series;  // null for a reference line
-  std::string name;
-  double x_px, y_px;
-};
+// In rows above the plot.
 std::vector<LegendEntry> legend_of(const Plot& plot) {
   std::vector<LegendEntry> entries;
   double x = 8, y = 40;
@@ -255,11 +258,18 @@ void make_isotropic(Layout& layout) {
   }
 }
 
-Layout layout_of(const Plot& plot, double top_px, double bottom_edge_px) {
-  Layout layout{0,
-                top_px,
+Layout layout_of(const Plot& plot) {
+  std::vector<LegendEntry> legend = legend_of(plot);
+  const double top = legend.empty() ? 32 : legend.back().y_px + 14;
+  const double total = height_px + (plot.image_plane ? 40 : 0) + std::max(0.0, top - 54);
+  const double bottom_edge = total - bottom_px;
+  Layout layout{std::move(legend),
+                total,
+                0,
+                top,
+                bottom_edge,
                 {range_of(plot, plot.x, &Series::x, {}), plot.x.logarithmic, 0, width_px - right_px},
-                {range_of(plot, plot.y, &Series::y, plot.references), plot.y.logarithmic, bottom_edge_px, top_px}};
+                {range_of(plot, plot.y, &Series::y, plot.references), plot.y.logarithmic, bottom_edge, top}};
   if (plot.image_plane) std::swap(layout.y.at_low_px, layout.y.at_high_px);
   const auto place_left = [&layout] {
     std::size_t widest = 1;
@@ -276,22 +286,8 @@ Layout layout_of(const Plot& plot, double top_px, double bottom_edge_px) {
   return layout;
 }
 
-// Where everything goes.
-struct Sheet {
-  std::vector<LegendEntry> legend;
-  double height_px, bottom_edge_px;
-  Layout layout;
-};
-
-Sheet sheet_of(const Plot& plot) {
-  std::vector<LegendEntry> legend = legend_of(plot);
-  const double top = legend.empty() ? 32 : legend.back().y_px + 14;
-  const double total = height_px + (plot.image_plane ? 40 : 0) + std::max(0.0, top - 54);
-  const double bottom_edge = total - bottom_px;
-  return {std::move(legend), total, bottom_edge, layout_of(plot, top, bottom_edge)};
-}
-
-std::string axes(const Plot& plot, const Layout& layout, double bottom_edge_px) {
+std::string axes(const Plot& plot, const Layout& layout) {
+  const double bottom_edge_px = layout.bottom_edge_px;
   std::string text;
   const auto x_ticks = ticks_of(layout.x, 7), y_ticks = ticks_of(layout.y, 6);
   const auto x_labels = tick_labels(x_ticks), y_labels = tick_labels(y_ticks);
@@ -398,8 +394,7 @@ Plot time_plot(std::string title, std::string label, std::string unit, std::vect
 }
 
 std::string svg_from(const Plot& plot) {
-  const Sheet sheet = sheet_of(plot);
-  const Layout& layout = sheet.layout;
+  const Layout layout = layout_of(plot);
   std::string content;
   for (const ReferenceLine& line : plot.references)
     content +=
@@ -407,19 +402,19 @@ std::string svg_from(const Plot& plot) {
                     layout.left_px, layout.y(line.y), width_px - right_px, escaped(line.name), number(line.y));
   for (const Series& series : plot.series) content += drawn(plot, layout, series);
   std::string text = fmt::format("<svg class=\"plot\" viewBox=\"0 0 {:.0f} {:.0f}\" role=\"img\" aria-label=\"{}\">\n",
-                                 width_px, sheet.height_px, escaped(plot.title));
+                                 width_px, layout.height_px, escaped(plot.title));
   text += fmt::format("<text class=\"title\" x=\"8\" y=\"{:.0f}\">{}</text>\n", font_px + 4, escaped(plot.title));
-  for (const LegendEntry& entry : sheet.legend) text += drawn(entry);
-  text += axes(plot, layout, sheet.bottom_edge_px);
+  for (const LegendEntry& entry : layout.legend) text += drawn(entry);
+  text += axes(plot, layout);
   const std::string clip = clip_name(text + content);
   text += fmt::format(
       "<clipPath id=\"{}\"><rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\"/></clipPath>\n", clip,
-      layout.left_px, layout.top_px, width_px - right_px - layout.left_px, sheet.bottom_edge_px - layout.top_px);
+      layout.left_px, layout.top_px, width_px - right_px - layout.left_px, layout.bottom_edge_px - layout.top_px);
   return text + fmt::format("<g clip-path=\"url(#{})\">\n", clip) + content + "</g>\n</svg>\n";
 }
 
 std::size_t points_outside(const Plot& plot) {
-  const Layout layout = sheet_of(plot).layout;
+  const Layout layout = layout_of(plot);
   const auto inside = [](const Range& range, double value) { return value >= range.low && value <= range.high; };
   std::size_t count = 0;
   for (const Series& series : plot.series)

@@ -11,8 +11,7 @@
 #include "lapservo/core/random.h"
 #include "lapservo/report/test_markup.h"
 
-namespace lapservo::internal {
-namespace svg_plot_test {
+namespace lapservo::internal::svg_plot_test {
 using testing::count_of;
 
 constexpr std::uint64_t seed = 71;
@@ -196,5 +195,4 @@ TEST(Svg, LimitsLeaveOutliersOutAndCountThem) {
   EXPECT_LT(*plot.x.high, 10);
 }
 
-}  // namespace svg_plot_test
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::svg_plot_test

@@ -1,7 +1,6 @@
 #include "lapservo/rig/calibration_record.h"
 
 #include <algorithm>
-#include <array>
 #include <cstdint>
 #include <fstream>
 #include <limits>
@@ -17,24 +16,7 @@
 #include "lapservo/rig/rig_files.h"
 
 namespace lapservo::internal {
-namespace {
 namespace fs = std::filesystem;
-
-struct FileState {
-  std::uint64_t bytes = 0, files = 0;
-  std::int64_t changed = std::numeric_limits<std::int64_t>::min();  // the last of them; now is below 0 in this clock
-
-  void add(const fs::path& file) {
-    std::error_code error;
-    const auto size = fs::file_size(file, error);
-    const auto time = fs::last_write_time(file, error);
-    if (error) return;
-    bytes += size, ++files;
-    changed = std::max<std::int64_t>(changed, time.time_since_epoch().count());
-  }
-};
-
-}  // namespace
 
 const CalibrationStep* CalibrationRecord::find(const std::string& name) const {
   const auto step = std::find_if(steps.begin(), steps.end(), [&](const auto& s) { return s.name == name; });
@@ -104,16 +86,24 @@ std::string rig_state(const fs::path& path) {
 }
 
 std::string input_state(const fs::path& path) {
-  FileState state;
+  std::uint64_t bytes = 0, files = 0;
+  std::int64_t changed = std::numeric_limits<std::int64_t>::min();  // the last of them; now is below 0 in this clock
+  const auto add = [&](const fs::path& file) {
+    std::error_code error;
+    const auto size = fs::file_size(file, error);
+    const auto time = fs::last_write_time(file, error);
+    if (error) return;
+    bytes += size, ++files;
+    changed = std::max<std::int64_t>(changed, time.time_since_epoch().count());
+  };
   std::error_code error;
   if (fs::is_directory(path, error)) {
     for (const auto& entry : fs::directory_iterator(path, error))
-      if (entry.is_regular_file(error)) state.add(entry.path());
+      if (entry.is_regular_file(error)) add(entry.path());
   } else if (fs::is_regular_file(path, error)) {
-    state.add(path);
+    add(path);
   }
-  if (state.files == 0) return {};
-  return fmt::format("{} files, {} bytes, {}", state.files, state.bytes, state.changed);
+  return files == 0 ? std::string() : fmt::format("{} files, {} bytes, {}", files, bytes, changed);
 }
 
 }  // namespace lapservo::internal

@@ -60,25 +60,8 @@ constexpr auto ros2 = R"(header:
 height: 480
 width: 640
 distortion_model: rational_polynomial
-d:
-- -0.15
-- 0.02
-- 0.001
-- -0.002
-- 0.0
-- 0.0
-- 0.0
-- 0.0
-k:
-- 500.0
-- 0.0
-- 320.5
-- 0.0
-- 510.0
-- 240.25
-- 0.0
-- 0.0
-- 1.0
+d: [-0.15, 0.02, 0.001, -0.002, 0.0, 0.0, 0.0, 0.0]
+k: [500.0, 0.0, 320.5, 0.0, 510.0, 240.25, 0.0, 0.0, 1.0]
 ---
 )";
 
@@ -145,7 +128,7 @@ TEST(CameraFormats, OfCamerasThatAreNotModelledAreRefused) {
   expect_remedy(replaced(kalibr, "radtan", "equidistant"), "equidistant");
   expect_remedy(replaced(kalibr, "pinhole", "omni"), "omni");
   expect_remedy(replaced(opencv, "board_width: 9", "fisheye_model: 1"), "fisheye");
-  expect_remedy(replaced(ros2, "- 0.0\nk:", "- 0.3\nk:"), "rational");
+  expect_remedy(replaced(ros2, "0.0]\nk:", "0.3]\nk:"), "rational");
 }
 
 }  // namespace

@@ -21,8 +21,7 @@ JointRanges ranges_of(const std::vector<std::array<double, 4>>& readings) {
   constexpr double wild = 0.01;
   JointRanges ranges;
   for (std::size_t j = 0; j < 4; ++j) {
-    std::vector<double> of_joint;
-    for (const auto& at : readings) of_joint.push_back(at[j]);
+    const auto of_joint = values_of(readings, [=](const auto& at) { return at[j]; });
     ranges.low[j] = quantile_of(of_joint, wild), ranges.high[j] = quantile_of(of_joint, 1 - wild);
   }
   return ranges;

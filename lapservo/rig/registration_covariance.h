@@ -19,4 +19,8 @@ std::string exact_registration_text(const Instrument& instrument);
 Eigen::Matrix<double, 6, 6> in_camera_axes(const Rigid3& camera_from_rcm,
                                            const Eigen::Matrix<double, 6, 6>& of_rotation_and_translation);
 
+/// How track, check and servo name images that contradict camera_from_rcm, and what to do.
+inline constexpr auto misses_rcm_text = "the shaft misses the rig's RCM";
+inline constexpr auto measure_registration_text = "lapservo calibrate registration measures camera_from_rcm";
+
 }  // namespace lapservo::internal

@@ -13,13 +13,7 @@ namespace {
 using Covariance = Eigen::Matrix<double, 6, 6>;
 
 Instrument turned_by(const Eigen::Vector3d& vector_rad) {
-  Instrument instrument;
-  instrument.camera_from_rcm = Rigid3{rotation_by(vector_rad), {0.01, 0.02, 0.1}};
-  return instrument;
-}
-
-TEST(RegistrationCovariance, IsZeroWithoutSigmas) {
-  EXPECT_EQ(registration_covariance(turned_by({0.1, 0.2, 0.3})), Covariance::Zero());
+  return {"", {}, Rigid3{rotation_by(vector_rad), {0.01, 0.02, 0.1}}};
 }
 
 // The sigmas of a quaternion whose rotation is as uncertain about each axis are those of that rotation.
@@ -43,7 +37,8 @@ TEST(RegistrationCovariance, FollowsFromTheSigmasOfTheTransform) {
   }
 }
 
-TEST(RegistrationCovariance, IsTheRigsWhereItHasOne) {
+TEST(RegistrationCovariance, IsTheRigsWhereItHasOneAndZeroWithoutSigmas) {
+  EXPECT_EQ(registration_covariance(turned_by({0.1, 0.2, 0.3})), Covariance::Zero());
   Instrument instrument = turned_by({0, 0, 0});
   instrument.sigma_translation_m = {1e-3, 2e-3, 3e-3};
   instrument.registration_covariance = 2e-6 * Covariance::Identity();

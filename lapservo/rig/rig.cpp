@@ -1,28 +1,25 @@
 #include "lapservo/rig/rig.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
-#include <limits>
-#include <optional>
 #include <sstream>
-#include <string>
-#include <vector>
+#include <utility>
 
+#include <Eigen/Geometry>
 #include <fmt/format.h>
 
+#include "lapservo/core/csv.h"
+#include "lapservo/core/dense_matrix.h"
 #include "lapservo/core/joint_units.h"
 #include "lapservo/core/known_keys.h"
 #include "lapservo/core/yaml_field.h"
-#include "lapservo/geometry/invertible.h"
+#include "lapservo/geometry/field_of_view.h"
 #include "lapservo/marker/decoder.h"
 #include "lapservo/rig/camera_formats.h"
 #include "lapservo/rig/check_rig.h"
-#include "lapservo/rig/matrix_field.h"
-#include "lapservo/rig/response_field.h"
 #include "lapservo/rig/rig_files.h"
-#include "lapservo/rig/tool_field.h"
+#include "lapservo/tool/dvrk_tool_file.h"
 
 namespace lapservo {
 using namespace internal;
@@ -31,6 +28,7 @@ namespace fs = std::filesystem;
 
 constexpr auto file_kind = "rig file";
 constexpr double max_tolerance_m = 5e-3;
+constexpr double rotation_tolerance = 2e-4;  // what four typed digits leave
 
 // One standard deviation each, where the key is there; not below 0, by expect_keys().
 std::optional<double> sigma_in(const YamlField& map, const char* key) {
@@ -50,6 +48,13 @@ int parse_image_size(const YamlField& field) {
   return static_cast<int>(value);
 }
 
+// The `rows` and `cols` of a ROS matrix, where they are there.
+void check_shape(const YamlField& field, int rows, int columns) {
+  for (const auto& [key, size] : {std::pair{"rows", rows}, {"cols", columns}})
+    if (const YamlField given = field[key]; given.present() && given.number("a whole number") != size)
+      given.fail(given.value_text(), std::to_string(size));
+}
+
 // A ROS matrix: rows and cols say how the numbers of data lie.
 template <std::size_t N>
 std::array<double, N> parse_matrix(const YamlField& field, int rows, int columns, std::string_view expected) {
@@ -59,13 +64,39 @@ std::array<double, N> parse_matrix(const YamlField& field, int rows, int columns
   return numbers;
 }
 
+// Refuses what is not symmetric or has a negative variance in some direction.
+Eigen::MatrixXd parse_covariance(const YamlField& field, int size, std::string_view expected) {
+  expect_keys(field, {{"rows", "cols", "data"}, {}});
+  const auto items = field["data"].list(expected);
+  if (items.size() != static_cast<std::size_t>(size) * static_cast<std::size_t>(size))
+    field["data"].fail(field["data"].value_text(), expected);
+  check_shape(field, size, size);
+  Eigen::MatrixXd given(size, size);
+  for (std::size_t i = 0; i < items.size(); ++i)
+    given.reshaped()[static_cast<Eigen::Index>(i)] = items[i].number(expected);
+  const Eigen::MatrixXd covariance = (given + given.transpose()) / 2;
+  const double rounding = 1e-9 * covariance.cwiseAbs().maxCoeff();
+  if (!((given - covariance).cwiseAbs().maxCoeff() <= rounding) ||
+      !(eigenvalues_of_symmetric(covariance).minCoeff() >= -rounding))
+    field.fail("not symmetric, or of negative variance", expected);
+  return covariance;
+}
+
+Eigen::Quaterniond parse_unit_quaternion(const YamlField& field) {
+  const auto q = field.numbers<4>("x y z w of a unit quaternion");
+  const Eigen::Quaterniond rotation(q[3], q[0], q[1], q[2]);
+  if (!(std::abs(rotation.norm() - 1) < rotation_tolerance))
+    field.fail("of norm " + std::to_string(rotation.norm()), "x y z w of a unit quaternion, to four digits");
+  // A normalised quaternion keeps its bits, however often a rig is written and read.
+  const bool unit = std::abs(rotation.squaredNorm() - 1) < 1e-14;
+  return unit ? rotation : rotation.normalized();
+}
+
 std::array<double, 5> parse_distortion(const YamlField& field) {
   expect_keys(field, {{"rows", "cols", "data"}, {}});
   const YamlField data = field["data"];
   std::vector<double> numbers;
-  constexpr double any = std::numeric_limits<double>::infinity();
-  for (const YamlField& item : data.list("k1 k2 p1 p2 k3"))
-    numbers.push_back(item.number_between(-any, any, "a finite number"));
+  for (const YamlField& item : data.list("k1 k2 p1 p2 k3")) numbers.push_back(item.number("a finite number"));
   if (const char* expected = expected_distortion(numbers)) data.fail(data.value_text(), expected);
   if (!numbers.empty()) check_shape(field, 1, static_cast<int>(numbers.size()));
   std::array<double, 5> coefficients{};
@@ -102,6 +133,53 @@ void check_unused(const YamlField& field) {
   for (const char* key : {"x_offset", "y_offset"})
     if (const YamlField offset = roi[key]; offset.present())
       offset.number_between(0, 0, "0: a camera_matrix of the pixels as they are");
+}
+
+std::vector<double> rising_from_0_to_1(const YamlField& field) {
+  constexpr auto expected = "2 to 4096 numbers that rise from 0 to 1";
+  std::vector<double> numbers;
+  for (const YamlField& item : field.list(expected)) {
+    numbers.push_back(item.number_between(0, 1, expected));
+    if (numbers.size() > 1 && !(numbers.back() > numbers[numbers.size() - 2])) item.fail(item.value_text(), expected);
+  }
+  if (numbers.size() < 2 || numbers.size() > 4096 || numbers.front() != 0 || numbers.back() != 1)
+    field.fail(field.value_text(), expected);
+  return numbers;
+}
+
+std::vector<double> sigmas_like(const YamlField& field, std::size_t size) {
+  std::vector<double> sigmas;
+  for (const YamlField& item : field.list(sigmas_expected)) sigmas.push_back(item.number(sigmas_expected));
+  if (sigmas.size() != size) field.fail(field.value_text(), sigmas_expected);
+  return sigmas;
+}
+
+Response parse_table(const YamlField& field) {
+  expect_keys(field, {{}, {"light", "value"}});
+  Response response{Response::Kind::table, 1, rising_from_0_to_1(field["light"]), rising_from_0_to_1(field["value"])};
+  if (response.table_light.size() != response.table_value.size())
+    field["value"].fail(field["value"].value_text(), "as many numbers as light has");
+  if (const YamlField sigmas = field["sigma_light"]; sigmas.present())
+    response.sigma_light = sigmas_like(sigmas, response.table_light.size());
+  if (const YamlField sigmas = field["sigma_value"]; sigmas.present())
+    response.sigma_value = sigmas_like(sigmas, response.table_value.size());
+  return response;
+}
+
+// srgb where it is missing.
+Response parse_response(const YamlField& field) {
+  constexpr auto expected = "srgb, rec709, linear, gamma:VALUE with a value of 0.2 to 5, or a table of light and value";
+  if (!field.present()) return {};
+  if (field.is_map()) return parse_table(field);
+  const std::string text = field.text(expected);
+  if (text == "srgb") return {};
+  if (text == "rec709") return {Response::Kind::rec709};
+  if (text == "linear") return {Response::Kind::power, 1};
+  constexpr std::string_view prefix = "gamma:";
+  const auto gamma =
+      text.starts_with(prefix) ? parse_finite(std::string_view(text).substr(prefix.size())) : std::nullopt;
+  if (!gamma || *gamma < 0.2 || *gamma > 5) field.fail(text, expected);
+  return {Response::Kind::power, *gamma};
 }
 
 ChromaticAberration parse_chromatic_aberration(const YamlField& field) {
@@ -231,8 +309,7 @@ Joints parse_joints(const YamlField& field) {
   if (names.size() != joints.names.size()) field["names"].fail(field["names"].value_text(), four_names);
   for (std::size_t i = 0; i < names.size(); ++i) {
     joints.names[i] = names[i].text(four_names);
-    const bool repeated =
-        std::find(joints.names.begin(), joints.names.begin() + i, joints.names[i]) != joints.names.begin() + i;
+    const bool repeated = std::ranges::count(joints.names, joints.names[i]) > 1;
     if (repeated || !is_plain_name(joints.names[i])) names[i].fail(joints.names[i], four_names);
   }
   const auto signs = field["sign"];
@@ -246,6 +323,130 @@ Joints parse_joints(const YamlField& field) {
   expect_radians_and_metres(field["offset"], joints.offset, offsets);
   joints.sigma_offset = sigmas_in<4>(field, "sigma_offset");
   return joints;
+}
+
+constexpr double max_length_m = 1, max_angle_rad = 6.2832;
+constexpr auto metres = "metres within 1: larger numbers look like millimetres";
+constexpr auto radians = "radians, at most a turn: larger numbers look like degrees";
+
+Eigen::Vector3d point_in(const YamlField& field) {
+  return Eigen::Vector3d(field.numbers<3>("x y z in metres", max_length_m, metres).data());
+}
+double length_in(const YamlField& map, const char* key) {
+  const YamlField field = map[key];
+  return field.present() ? field.number_between(-max_length_m, max_length_m, metres) : 0;
+}
+double angle_in(const YamlField& map, const char* key) {
+  const YamlField field = map[key];
+  return field.present() ? field.number_between(-max_angle_rad, max_angle_rad, radians) : 0;
+}
+
+// One for each joint of the wrist; none where the key is not there.
+std::vector<double> angles_in(const YamlField& map, const char* key, std::size_t count) {
+  const YamlField field = map[key];
+  if (!field.present()) return {};
+  const std::string expected = fmt::format("{} numbers, one for each joint of the wrist", count);
+  std::vector<double> angles;
+  for (const YamlField& item : field.list(expected))
+    angles.push_back(item.number_between(-max_angle_rad, max_angle_rad, radians));
+  if (angles.size() != count) field.fail(field.value_text(), expected);
+  return angles;
+}
+
+WristJoint parse_joint(const YamlField& field) {
+  expect_keys(field, {{"name", "alpha_rad", "a_m", "theta_rad", "d_m"}, {}});
+  WristJoint joint;
+  joint.name = field["name"].text("a joint's name");
+  joint.alpha_rad = angle_in(field, "alpha_rad"), joint.theta_rad = angle_in(field, "theta_rad");
+  joint.a_m = length_in(field, "a_m"), joint.d_m = length_in(field, "d_m");
+  return joint;
+}
+
+Tool parse_wrist(const YamlField& field) {
+  constexpr auto expected = "one to four joints of a wrist with different names";
+  Tool tool;
+  const auto fields = field["joints"].list(expected);
+  if (fields.empty() || fields.size() > Tool::max_wrist_joints)
+    field["joints"].fail(field["joints"].value_text(), expected);
+  for (const YamlField& joint : fields) {
+    tool.wrist.push_back(parse_joint(joint));
+    const std::string name = tool.wrist.back().name;
+    if (std::ranges::count(tool.wrist, name, &WristJoint::name) > 1) joint["name"].fail(name, expected);
+  }
+  tool.last_from_tip.translation = point_in(field["tip_in_last_joint_m"]);
+  if (const YamlField turn = field["tip_quaternion_xyzw"]; turn.present())
+    tool.last_from_tip.rotation = parse_unit_quaternion(turn);
+  if (const YamlField snake = field["snake_like"]; snake.present()) tool.snake_like = snake.boolean();
+  return tool;
+}
+
+// By the sigmas beside the numbers, unless there is a covariance.
+Tool::PlaceCovariance parse_place_covariance(const YamlField& field, const char* base_key, std::size_t wrist_joints) {
+  Tool::PlaceCovariance covariance = Tool::PlaceCovariance::Zero();
+  const int size = wrist_joints == 0 ? 3 : static_cast<int>(4 + wrist_joints);
+  if (const YamlField given = field["covariance"]; given.present()) {
+    const std::string expected =
+        fmt::format("{} numbers, a covariance of x y z [m]{}", size * size,
+                    wrist_joints == 0 ? "" : fmt::format(", azimuth_rad and {} numbers of offset_rad", wrist_joints));
+    covariance.topLeftCorner(size, size) = parse_covariance(given, size, expected);
+    return covariance;
+  }
+  Eigen::Matrix<double, Tool::PlaceCovariance::RowsAtCompileTime, 1> sigmas = decltype(sigmas)::Zero();
+  if (const YamlField sigma = field[std::string("sigma_") + base_key]; sigma.present())
+    sigmas.head<3>() = point_in(sigma);
+  if (wrist_joints != 0) {
+    sigmas[3] = angle_in(field, "sigma_azimuth_rad");
+    std::ranges::copy(angles_in(field, "sigma_offset_rad", wrist_joints), sigmas.data() + 4);
+  }
+  covariance.diagonal() = sigmas.cwiseAbs2();
+  return covariance;
+}
+
+Tool parse_straight(const YamlField& field) {
+  constexpr auto key = "tip_in_marker_m";
+  expect_keys(field, {{"covariance"}, {key}});
+  Tool tool;
+  tool.place.emplace().base_in_marker_m = point_in(field[key]);
+  tool.place->covariance = parse_place_covariance(field, key, 0);
+  return tool;
+}
+
+void parse_readings(const YamlField& field, Tool& tool) {
+  const auto read = [&](const char* key, double WristJoint::*member) {
+    const std::vector<double> angles = angles_in(field, key, tool.wrist.size());
+    for (std::size_t i = 0; i < angles.size(); ++i) tool.wrist[i].*member = angles[i];
+  };
+  read("offset_rad", &WristJoint::offset_rad);
+  read("sigma_reading_rad", &WristJoint::sigma_reading_rad);
+  for (const WristJoint& joint : tool.wrist)
+    if (joint.sigma_reading_rad < 0) field["sigma_reading_rad"].fail("below 0", sigmas_expected);
+}
+
+Tool parse_wristed(const YamlField& field, const fs::path& folder) {
+  constexpr auto key = "wrist_in_marker_m";
+  const bool has_file = field["file"].present();
+  KnownKeys known{{"file", "covariance", "sigma_reading_rad"}, {key, "azimuth_rad", "offset_rad"}};
+  if (!has_file)
+    known.words.insert(known.words.end(), {"joints", "tip_in_last_joint_m", "tip_quaternion_xyzw", "snake_like"});
+  expect_keys(field, known);
+  Tool tool =
+      has_file ? read_dvrk_tool(folder / field["file"].text("the path of a dVRK tool file")) : parse_wrist(field);
+  parse_readings(field, tool);
+  const bool placed = field[key].present();
+  for (const char* other : {"azimuth_rad", "sigma_offset_rad", "covariance"})
+    if (!placed && field[other].present()) field[other].fail("alone", std::string(key) + " beside it");
+  if (!placed) return tool;
+  const YamlField azimuth = field["azimuth_rad"];
+  tool.place.emplace().base_in_marker_m = point_in(field[key]);
+  tool.place->azimuth_rad = azimuth.number_between(-max_angle_rad, max_angle_rad, radians);
+  tool.place->covariance = parse_place_covariance(field, key, tool.wrist.size());
+  return tool;
+}
+
+Tool parse_tool(const YamlField& field, const fs::path& folder) {
+  if (field.is_scalar()) return read_dvrk_tool(folder / field.text("the path of a dVRK tool file"));
+  if (!field.is_map()) field.fail(field.value_text(), "the path of a dVRK tool file, or a map");
+  return field["tip_in_marker_m"].present() ? parse_straight(field) : parse_wristed(field, folder);
 }
 
 Instrument parse_instrument(const YamlField& field, const fs::path& folder) {

@@ -65,28 +65,17 @@ std::string second_instrument(const std::string& name, const std::string& hues_d
 }
 
 TEST(Rig, HoldsWhatTheFileSays) {
-  Instrument instrument;
-  instrument.name = "PSM1";
-  instrument.marker.diameter_m = 0.0084;
-  instrument.marker.hues_deg = {90, 180, 270};
-  instrument.marker.bands_upper_m = {0.0035, 0.0036, 0.0169};
-  instrument.marker.bands_lower_m = {0.0095, 0.0094, 0.0051};
-  instrument.marker.seam_rad = 0.25, instrument.marker.tolerance_m = 1e-4;
-  instrument.camera_from_rcm = {Eigen::Quaterniond(0.8, 0, 0, 0.6), {-0.0778, 0.0672, 0.0592}};
-  Rig expected;
-  expected.camera = {1280, 720, 1100, 1090, 639.5, 359.5, {-0.1, 0.02, 0.001, -0.002, 0}, {Response::Kind::power, 2.2}};
-  expected.instruments = {instrument};
-  EXPECT_EQ(parse_rig(good, "rig.yaml"), expected);
+  const Response gamma{Response::Kind::power, 2.2};
+  const Camera camera{1280, 720, 1100, 1090, 639.5, 359.5, {-0.1, 0.02, 0.001, -0.002, 0}, gamma};
+  const Marker print{0.0084, {90, 180, 270}, {0.0035, 0.0036, 0.0169}, {0.0095, 0.0094, 0.0051}, 0.25, 1e-4};
+  const Rigid3 camera_from_rcm{Eigen::Quaterniond(0.8, 0, 0, 0.6), {-0.0778, 0.0672, 0.0592}};
+  EXPECT_EQ(parse_rig(good, "rig.yaml"), (Rig{camera, {Instrument{"PSM1", print, camera_from_rcm}}}));
 }
 
 TEST(Rig, LeavesOutWhatIsOptional) {
-  Instrument instrument;
-  instrument.name = "tool";
-  instrument.marker.diameter_m = 0.005, instrument.marker.hues_deg = {90, 180, 270};
-  instrument.marker.bands_upper_m = {0.003, 0.003, 0.009}, instrument.marker.bands_lower_m = {0.006, 0.006, 0.003};
-  Rig expected;
-  expected.camera = {64, 48, 50, 50, 32, 24, {}, {Response::Kind::srgb}};
-  expected.instruments = {instrument};
+  const Camera camera{64, 48, 50, 50, 32, 24, {}, {Response::Kind::srgb}};
+  const Marker print{0.005, {90, 180, 270}, {0.003, 0.003, 0.009}, {0.006, 0.006, 0.003}};
+  const Rig expected{camera, {Instrument{"tool", print, {}}}};
   EXPECT_EQ(parse_rig(R"(
 camera: {image_width: 64, image_height: 48, camera_matrix: {data: [50, 0, 32, 0, 50, 24, 0, 0, 1]}}
 instruments:
@@ -147,12 +136,8 @@ const Complaints missing_keys{
     {good.substr(0, good.find("  - name")) + "  []\n",
      "instruments: is a list of 0, expected one to eight instruments"},
     {with("  image_width: 1280\n", ""), "camera.image_width: is missing, " + pixels},
-    {with("  camera_matrix: {rows: 3, cols: 3, data: [1100, 0, 639.5, 0, 1090, 359.5, 0, 0, 1]}\n", ""),
-     "camera.camera_matrix: is missing, expected a map with 'data'"},
     {with("data: [1100", "values: [1100"), unknown("camera.camera_matrix.values", "cols")},
     {with("      diameter_m: 0.0084\n", ""), marker + "diameter_m: is missing, " + diameter},
-    {with("      bands_upper_m: [0.0035, 0.0036, 0.0169]\n", ""),
-     marker + "bands_upper_m: is missing, expected three lengths in metres"},
     {with("      translation_m: [-0.0778, 0.0672, 0.0592]\n", ""),
      from_rcm + "translation_m: is missing, expected x y z in metres"},
 };
@@ -160,10 +145,8 @@ const Complaints missing_keys{
 const Complaints wrong_types{
     {"rig", "file: is rig, expected a map with 'camera'"},
     {"camera: [1]\n", "camera: is a list of 1, expected a map with 'image_width'"},
-    {with("1280", "wide"), "camera.image_width: is wide, " + pixels},
     {with("1280", "1280px"), "camera.image_width: is 1280px, " + pixels},
     {with("  response", "  deinterlace: 1\n  response"), "camera.deinterlace: is 1, expected true or false"},
-    {with("639.5", "centre"), "camera.camera_matrix.data[2]: is centre, " + finite},
     {with("[-0.1", "[nan"), "camera.distortion_coefficients.data[0]: is nan, " + finite},
     {with("0, 0, 1]}", "0, 0]}"),
      "camera.camera_matrix.data: is a list of 8, expected nine numbers, fx 0 cx 0 fy cy 0 0 1"},
@@ -174,14 +157,10 @@ const Complaints wrong_types{
      "camera.distortion_coefficients.data: is a list of 8, expected k4 k5 k6 of 0: a rational lens is not modelled "
      "(lapservo calibrate camera fits plumb_bob)"},
     {with("gamma:2.2", "log"), "camera.response: is log, " + response},
-    {with("  - name: PSM1\n    marker:", "  PSM1:\n    marker:"),
-     "instruments: is a map, expected a list of instruments"},
     {with("[90, 180, 270]", "90"), marker + "hues_deg: is 90, expected three hues in degrees"},
     {with("[0.0035, 0.0036, 0.0169]", "[0.0035, 0.0205]"),
      marker + "bands_upper_m: is a list of 2, expected three lengths in metres"},
     {with("0.25", "left"), marker + "seam_rad: is left, expected an angle in radians"},
-    {good.substr(0, good.find("    camera_from_rcm")) + "    camera_from_rcm: 3\n",
-     "instruments[0].camera_from_rcm: is 3, expected a map with 'translation_m'"},
 };
 
 const Complaints impossible_cameras{
@@ -286,30 +265,14 @@ TEST(Rig, TakesThreeInstrumentsOfCyclicColourOrdersAndNotNine) {
   EXPECT_EQ(error_of(nine), "rig.yaml: instruments: is a list of 9, expected one to eight instruments");
 }
 
-// Wherever the file ends, there is a rig or a complaint of one line; nothing else is thrown.
-TEST(Rig, IsWholeOrRefusedWhereverTheFileIsCut) {
-  int whole = 0;
-  const std::size_t start = good.find("1280");  // before it, the camera is a word: the name of a file
-  for (std::size_t length = start; length <= good.size(); ++length) {
-    const std::string said = error_of(good.substr(0, length));
-    whole += said.empty();
-    EXPECT_TRUE(said.empty() || said.starts_with("rig.yaml: ")) << said;
-    EXPECT_EQ(said.find('\n'), std::string::npos) << said;
-  }
-  EXPECT_GT(whole, 0);
-  EXPECT_LT(whole, 100);
-}
-
 TEST(Rig, RefusesWhatIsNotYaml) {
   EXPECT_TRUE(error_of("camera: [1, 2").starts_with("rig.yaml: is not YAML: "));
   EXPECT_TRUE(error_of("a: b: c").starts_with("rig.yaml: is not YAML: "));
-  EXPECT_EQ(error_of(std::string(100000, '[')), "rig.yaml: nests more deeply than a rig file does");
   std::string nested, ruler(3000, '-');
   for (int i = 0; i < 3000; ++i) nested += "- ";
   EXPECT_EQ(error_of(nested), "rig.yaml: nests more deeply than a rig file does");
   EXPECT_NE(error_of(ruler), "rig.yaml: nests more deeply than a rig file does");
   EXPECT_EQ(error_of("# " + ruler + "\n" + good), "");
-  EXPECT_EQ(error_of(std::string(2 << 20, ' ')), "rig.yaml: is larger than 1 MiB, expected a rig file");
 }
 
 TEST(LoadRig, NamesTheFileThatIsWrongOrCanNotBeRead) {
@@ -319,11 +282,7 @@ TEST(LoadRig, NamesTheFileThatIsWrongOrCanNotBeRead) {
   testing::write_file(folder / "rig.yaml", "camera: camera.yaml\n" + good.substr(good.find("instruments:")));
   EXPECT_EQ(said(folder / "rig.yaml"), (folder / "camera.yaml").string() + ": image_width: is wide, " + pixels);
   testing::write_file(folder / "empty.yaml", "");
-  EXPECT_EQ(said(folder / "none.yaml"), (folder / "none.yaml").string() + ": can't be opened, expected a YAML file");
   EXPECT_EQ(said(folder / "empty.yaml"), (folder / "empty.yaml").string() + ": is empty, expected a YAML file");
-  EXPECT_EQ(said(folder.path()), folder.path().string() + ": is a folder, expected a YAML file");
-  const std::string long_name(300, 'a');
-  EXPECT_EQ(error_of("camera: " + long_name), "./" + long_name + ": can't be opened, expected a YAML file");
   EXPECT_EQ(error_of("camera: /dev/zero"), "/dev/zero: is larger than 1 MiB, expected a YAML file");
 }
 

@@ -1,5 +1,3 @@
-#include "lapservo/rig/tool_field.h"
-
 #include <string>
 
 #include <gtest/gtest.h>

@@ -9,7 +9,6 @@
 namespace lapservo::internal {
 namespace {
 
-// The definition: the instrument stays where it is unless the motor takes it along.
 TEST(Backlash, KeepsTheInstrumentWithinTheGap) {
   Random random(1);
   for (const double width : {0.0, 0.3}) {

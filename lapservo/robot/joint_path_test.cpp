@@ -42,15 +42,6 @@ TEST(JointPath, PathIsSmoothAtTheArmsRate) {
   }
 }
 
-TEST(JointPath, CoversTheMeanVelocityTimesThePeriod) {
-  JointPath path(acceleration);
-  path.reset(1, Eigen::Vector4d::Zero());
-  path.ramp_to(1, Eigen::Vector4d::Ones(), 0.1);
-  EXPECT_NEAR(path.end().position[0], 0.05, 1e-12);
-  path.ramp_to(1.1, Eigen::Vector4d::Zero(), 0.1);
-  EXPECT_NEAR(path.end().position[0], 0.1, 1e-12);
-}
-
 TEST(JointPath, GoesOnFromAnotherPlaceAsFastAsItWas) {
   JointPath path(acceleration);
   path.reset(0, Eigen::Vector4d::Zero());
@@ -59,27 +50,6 @@ TEST(JointPath, GoesOnFromAnotherPlaceAsFastAsItWas) {
   path.move_to(0.2, Eigen::Vector4d::Ones());
   EXPECT_EQ(path.at(0.2).position, Eigen::Vector4d::Ones());
   EXPECT_EQ(path.at(0.2).velocity, velocity);
-}
-
-TEST(JointPath, BrakesWhenTheControllerIsLate) {
-  JointPath path(acceleration);
-  path.reset(0, Eigen::Vector4d::Zero());
-  path.ramp_to(0, rate, 0.3);
-  MotionState before = path.at(0.3);
-  constexpr double tick_s = 0.001;
-  for (double t = 0.3 + tick_s; t < 1; t += tick_s) {
-    const MotionState now = path.at(t);
-    const Eigen::Vector4d change = (now.velocity - before.velocity).cwiseAbs() / tick_s;
-    EXPECT_LE((change - acceleration).maxCoeff(), 1e-6) << t;
-    EXPECT_LT((now.position - before.position - tick_s * (now.velocity + before.velocity) / 2).norm(), 1e-5) << t;
-    before = now;
-  }
-  EXPECT_TRUE(before.velocity.isZero());
-  // Taken up again in the middle of braking, the path goes on from where it is.
-  const MotionState braking = path.at(0.35);
-  path.ramp_to(0.35, rate, 0.1);
-  EXPECT_TRUE(path.at(0.35).position.isApprox(braking.position, 1e-12));
-  EXPECT_TRUE(path.at(0.35).velocity.isApprox(braking.velocity, 1e-12));
 }
 
 }  // namespace

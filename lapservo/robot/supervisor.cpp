@@ -1,7 +1,5 @@
 #include "lapservo/robot/supervisor.h"
 
-#include <utility>
-
 #include <fmt/format.h>
 
 #include "lapservo/core/words.h"

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <limits>
 #include <optional>
 #include <string>
 #include <utility>
@@ -255,7 +254,7 @@ TEST(Supervisor, AStopBeatsAStartAndOldStartsAreVoid) {
     if (!stop_first) bench.supervisor.stop(Commander::page);
     EXPECT_FALSE(bench.moves(1));
   }
-  for (const double since_s : {1.1, -1.1, std::numeric_limits<double>::quiet_NaN()}) {
+  for (const double since_s : {1.1, -1.1, double{NAN}}) {
     bench.supervisor.start(Commander::page, bench.now - since_s);
     EXPECT_FALSE(bench.moves(1)) << since_s;
   }
@@ -296,7 +295,6 @@ TEST(Supervisor, WhoHoldsHasToLetGoUnlessTheStartHasForce) {
   EXPECT_TRUE(bench.moves_after_start(Commander::page, true));
 }
 
-// Each program on the topic holds for itself.
 TEST(Supervisor, AnotherProgramOnTheTopicDoesNotLetGo) {
   Bench bench(1);
   bench.supervisor.stop({Commander::topic, 1});
@@ -319,7 +317,6 @@ TEST(Supervisor, AStartThatWasSaidBeforeTheHoldIsVoid) {
   EXPECT_TRUE(bench.moves(0.8));
 }
 
-// Armed or not.
 TEST(Supervisor, WhatIsReportedNeedsAStart) {
   for (const double after_s : {0.0, 0.3, 1.0}) {
     Bench bench(after_s);
@@ -397,7 +394,7 @@ class Model {
     const bool ready = input.arm == Blocked::none && now >= before_s, late = now - before_s > config.max_silence_s;
     last_s_ = now;
     if (late && granted_) granted_ = moved_ = false, held_s_ = now, silent_s_.reset();
-    if (!ready || late) ready_s_ = std::numeric_limits<double>::infinity();
+    if (!ready || late) ready_s_ = INFINITY;
     if (ready) ready_s_ = std::min(ready_s_, now);
     for (const Commander& who : input.stops) holders_.insert(who);
     bool start = false;
@@ -428,7 +425,7 @@ class Model {
 
  private:
   std::optional<double> last_s_;
-  double ready_s_ = std::numeric_limits<double>::infinity(), last_ready_s_ = -1e300, held_s_ = -1e300;
+  double ready_s_ = INFINITY, last_ready_s_ = -1e300, held_s_ = -1e300;
   std::optional<double> hold_s_, silent_s_;
   Commanders holders_;
   bool granted_ = false, moved_ = false, free_ = true;

@@ -15,28 +15,18 @@ namespace lapservo {
 using namespace internal;
 namespace {
 
-Eigen::Vector4d four(const YamlField& field) {
-  const auto values = field.numbers<4>("a list of four numbers");
-  return Eigen::Vector4d(values.data());
-}
-
-struct LimitKey {
-  const char* key;
-  Eigen::Vector4d* values;
-  JointUnits units;
-};
-
 JointLimits read_limits(const YamlField& map, JointLimits limits) {
-  for (const auto& [key, values, units] :
-       std::initializer_list<LimitKey>{{"lower", &limits.lower, joint_positions},
-                                       {"upper", &limits.upper, joint_positions},
-                                       {"rate", &limits.rate, joint_rates},
-                                       {"acceleration", &limits.acceleration, joint_accelerations}})
-    if (const YamlField field = map[key]; field.present()) {
-      const auto numbers = field.numbers<4>("a list of four numbers");
-      expect_radians_and_metres(field, numbers, units);
-      *values = Eigen::Vector4d(numbers.data());
-    }
+  const auto read = [&](const char* key, Eigen::Vector4d& values, const JointUnits& units) {
+    const YamlField field = map[key];
+    if (!field.present()) return;
+    const auto numbers = field.numbers<4>("a list of four numbers");
+    expect_radians_and_metres(field, numbers, units);
+    values = Eigen::Vector4d(numbers.data());
+  };
+  read("lower", limits.lower, joint_positions);
+  read("upper", limits.upper, joint_positions);
+  read("rate", limits.rate, joint_rates);
+  read("acceleration", limits.acceleration, joint_accelerations);
   expect_keys(map, {{"lower", "upper", "rate", "acceleration"}, {}});
   return limits;
 }
@@ -85,7 +75,8 @@ ControllerConfig load_controller(const std::filesystem::path& path, const Contro
   if (const YamlField period = file["period_s"]; period.present()) config.period_s = period.number("a finite number");
   if (base.gains.per_s == usual_gains(base.mode, base.period_s).per_s)
     config.gains = usual_gains(config.mode, config.period_s);
-  if (const YamlField gains = file["gains_per_s"]; gains.present()) config.gains.per_s = four(gains);
+  if (const YamlField gains = file["gains_per_s"]; gains.present())
+    config.gains.per_s = Eigen::Vector4d(gains.numbers<4>("a list of four numbers").data());
   if (const YamlField delay = file["delay_s"]; delay.present()) config.observer.delay_s = read_delay(delay);
   if (const YamlField error = file["model_error"]; error.present())
     config.model_error = error.number("a number above 0");

@@ -2,6 +2,7 @@
 
 #include <fstream>
 #include <string>
+#include <tuple>
 
 #include <gtest/gtest.h>
 
@@ -38,14 +39,11 @@ class File {
 
 TEST(ControllerFile, ReadsBackToTheLastBit) {
   const ControllerConfig config = unusual(), read = load_controller(File(controller_yaml(config)).path(), {});
-  EXPECT_EQ(read.mode, config.mode);
-  EXPECT_EQ(read.period_s, config.period_s);
-  EXPECT_EQ(read.gains.per_s, config.gains.per_s);
-  EXPECT_EQ(read.observer.delay_s, config.observer.delay_s);
-  EXPECT_EQ(read.limits.lower, config.limits.lower);
-  EXPECT_EQ(read.limits.upper, config.limits.upper);
-  EXPECT_EQ(read.limits.rate, config.limits.rate);
-  EXPECT_EQ(read.limits.acceleration, config.limits.acceleration);
+  const auto fields = [](const ControllerConfig& c) {
+    return std::tuple(c.mode, c.period_s, c.gains.per_s, c.observer.delay_s, c.limits.lower, c.limits.upper,
+                      c.limits.rate, c.limits.acceleration);
+  };
+  EXPECT_EQ(fields(read), fields(config));
   ASSERT_TRUE(read.window);
   EXPECT_EQ(read.window->u_max_px, config.window->u_max_px);
   EXPECT_EQ(read.window->v_max_px, config.window->v_max_px);

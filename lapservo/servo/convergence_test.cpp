@@ -26,7 +26,6 @@ TEST(Convergence, TakesAWholeSecondWithin) {
   EXPECT_LT((convergence.rms_since() - close.cwiseAbs()).norm(), 1e-12);
 }
 
-// Later errors show in the rms, not in the time.
 TEST(Convergence, CountsWhatComesAfter) {
   Convergence convergence;
   for (int i = 0; i < 20; ++i) convergence.add(i * period_s, Eigen::Vector4d::Zero());

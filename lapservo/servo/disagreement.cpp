@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstddef>
 #include <limits>
 
@@ -50,12 +49,6 @@ Hypothesis hypothesis_of(Cause cause, int joint = 0) {
   if (cause != Cause::moved) return hypothesis;
   sigmas.segment<3>(arm::change).setConstant(wrong_rotation_rad);
   sigmas.segment<3>(arm::change + 3).setConstant(wrong_translation_m);
-  return hypothesis;
-}
-
-Hypothesis moved_between(double from_s, double to_s) {
-  Hypothesis hypothesis = hypothesis_of(Cause::moved);
-  hypothesis.from_s = from_s, hypothesis.to_s = to_s;
   return hypothesis;
 }
 
@@ -111,8 +104,10 @@ std::vector<Hypothesis> changes(const std::vector<MarkerSighting>& seen) {
   const std::size_t step = std::max<std::size_t>(1, seen.size() / places);
   for (std::size_t back = 2; back < seen.size(); back += back < 6 ? 1 : step) {
     const double from_s = seen[seen.size() - back].time_s;
-    all.push_back(moved_between(from_s, from_s));
-    all.push_back(moved_between(from_s, seen.back().time_s));
+    for (const double to_s : {from_s, seen.back().time_s}) {
+      all.push_back(hypothesis_of(Cause::moved));
+      all.back().from_s = from_s, all.back().to_s = to_s;
+    }
   }
   return all;
 }

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
+#include <iterator>
 
 #include "lapservo/servo/image_features.h"
 
@@ -51,16 +51,6 @@ bool add(std::vector<MarkerSighting>& sightings, const MarkerSighting& seen, std
   return sightings.size() != count;
 }
 
-MarkerSighting sighting(const ImageMeasurement& image, const Measured& measured) {
-  return {image.time_s, measured.q, measured.rate, *image.camera_from_marker};
-}
-
-// A registration that is a little wrong misfits from the start, by more and less as the arm moves.
-double most_misfit_rad(const Watching& watching, bool moves) {
-  const double agreed_rad = watching.offsets.empty() ? 0 : watching.offsets.front().misfit_rad;
-  return std::max(moves ? moving_misfit_rad : plain_misfit_rad, 2 * agreed_rad);
-}
-
 bool contradicts_itself(const RegistrationFit& fit) {
   return !(fit.rms_px < max_rms_px && fit.newest_rms_px < max_newest_rms_px);
 }
@@ -76,8 +66,8 @@ EndoscopeRecovery::EndoscopeRecovery(const Rig& rig)
     : rig_(rig), camera_from_rcm_(rig.instruments.at(0).camera_from_rcm) {}
 
 void EndoscopeRecovery::see(const ServoInput& input, VisualController& controller) {
-  if (const auto* waiting = std::get_if<WaitingForStart>(&state_); waiting && input.joints.started)
-    start(*waiting, controller);
+  if (const auto* measuring = std::get_if<Measuring>(&state_); measuring && measuring->certain && input.joints.started)
+    start(measuring->sightings, controller);
   if (input.joints.time_s - joints_s_ > silent_s) joints_from_s_ = input.joints.time_s;
   joints_s_ = input.joints.time_s;
   const auto& image = input.image;
@@ -93,7 +83,7 @@ void EndoscopeRecovery::see(const ServoInput& input, VisualController& controlle
 
 void EndoscopeRecovery::collect(const ImageMeasurement& image, VisualController& controller) {
   if (!image.camera_from_marker || !sees_from_start_) return;
-  if (add(seen_, sighting(image, *measured_), max_compared)) ++sightings_;
+  if (add(seen_, sighting(image), max_compared)) ++sightings_;
   // The operator's motion may show which number it is.
   if (const auto why = wrong_rig(); why && why->cause == Explanation::Cause::rig && sightings_ >= explain_at_)
     blames_rig(controller, Blame::named);
@@ -119,17 +109,20 @@ std::optional<Explanation> EndoscopeRecovery::wrong_rig() const {
 // Without a marker there would be nothing to measure with.
 void EndoscopeRecovery::watch(Watching& watching, const ImageMeasurement& image, VisualController& controller) {
   const Eigen::Vector4d& before = watching.offsets.empty() ? trusted_ : watching.offsets.back().q;
-  seen_joints_ = image.camera_from_marker ? seen_joints(rig_.camera, instrument(), sighting(image, *measured_), before)
-                                          : std::nullopt;
+  seen_joints_ =
+      image.camera_from_marker ? seen_joints(rig_.camera, instrument(), sighting(image), before) : std::nullopt;
   const bool moves = stepped(image, controller.delay_is_known());
+  // A registration that is a little wrong misfits from the start, by more and less as the arm moves.
+  const double agreed_rad = watching.offsets.empty() ? 0 : watching.offsets.front().misfit_rad;
+  const double most_misfit_rad = std::max(moves ? moving_misfit_rad : plain_misfit_rad, 2 * agreed_rad);
   const bool contradicts =
-      seen_joints_ && (seen_joints_->misfit_rad > most_misfit_rad(watching, moves) ||
+      seen_joints_ && (seen_joints_->misfit_rad > most_misfit_rad ||
                        ((seen_joints_->offset - before).head<3>().cwiseAbs().array() > max_jump.array()).any());
   watching.contradicting = contradicts ? watching.contradicting + 1 : 0;
   if (!contradicts && !moves) return drop_suspicion(controller);
   if (agreeing_ < agreed_after) return;
   if (watching.contradicting >= moved_after)
-    return blames_rig(controller, Blame::any) ? void() : notice(watching, controller);
+    return blames_rig(controller, Blame::any) ? void() : notice(watching.offsets, controller);
   watching.suspects = true;
   controller.suspend(HoldReason::endoscope_moved);
 }
@@ -184,25 +177,19 @@ bool EndoscopeRecovery::follow_joints(const ImageMeasurement& image, VisualContr
       now.sides[k] = std::abs(moved[2 + k]) > plain[k] ? (moved[2 + k] > 0 ? 1 : -1) : measured_->sides[k];
   }
   measured_ = now;
-  if (collects() && path_.joints.back() != now.q.tail<2>()) path_.joints.emplace_back(now.q.tail<2>());
-  return true;
-}
-
-// Until another offset is trusted, it is this path's.
-bool EndoscopeRecovery::collects() const {
-  if (path_.joints.empty()) return false;
+  // Until another offset is trusted, it is this path's.
   const auto* watching = std::get_if<Watching>(&state_);
-  return !watching || (watching->offsets.empty() && agreeing_ >= agreed_after);
+  const bool goes_on = !watching || (watching->offsets.empty() && agreeing_ >= agreed_after);
+  if (goes_on && !path_.joints.empty() && path_.joints.back() != now.q.tail<2>())
+    path_.joints.emplace_back(now.q.tail<2>());
+  return true;
 }
 
 void EndoscopeRecovery::follow(const ServoInput& input, const ControlStep& step, VisualController& controller) {
   if (auto* watching = std::get_if<Watching>(&state_)) return trust(*watching, input, step);
   if (!input.image || input.image->repetition != Repetition::none) return;
   const auto seen = sighting_of(*input.image);
-  if (!seen) return;
-  if (wrong_rig()) return;
-  if (auto* waiting = std::get_if<WaitingForStart>(&state_)) return void(add(waiting->sightings, *seen, max_images));
-  wait_for_motion(std::get<WaitingForMotion>(state_), *seen, controller);
+  if (auto* measuring = std::get_if<Measuring>(&state_); measuring && seen) collect(*measuring, *seen, controller);
 }
 
 void EndoscopeRecovery::trust(Watching& watching, const ServoInput& input, const ControlStep& step) {
@@ -215,64 +202,62 @@ void EndoscopeRecovery::trust(Watching& watching, const ServoInput& input, const
   while (input.time_s - watching.offsets.front().time_s > offset_memory_s) watching.offsets.pop_front();
 }
 
-void EndoscopeRecovery::notice(Watching& watching, VisualController& controller) {
+void EndoscopeRecovery::notice(const std::deque<Offset>& offsets, VisualController& controller) {
   // Where none was trusted since the last time, that time's still holds.
-  if (!watching.offsets.empty()) trust_before(std::move(watching.offsets));
+  if (!offsets.empty()) trust_before(offsets);
   camera_from_rcm_.reset();
   ++registration_;
   measure(controller);
 }
 
-void EndoscopeRecovery::trust_before(std::deque<Offset> offsets) {
+void EndoscopeRecovery::trust_before(const std::deque<Offset>& offsets) {
   // Where the latest are too young, the oldest that there is.
-  const double last_s = offsets.back().time_s;
-  std::deque<Offset> later;
-  while (offsets.size() > 1 && last_s - offsets.back().time_s < offset_age_s) {
-    later.push_front(offsets.back());
-    offsets.pop_back();
-  }
-  later.push_front(offsets.back());
-  trusted_ = offsets.back().q;
-  path_ = {later.front().measured.sides, {}};
-  for (const Offset& offset : later) path_.joints.emplace_back(offset.measured.q.tail<2>());
+  auto offset = std::prev(offsets.end());
+  while (offset != offsets.begin() && offsets.back().time_s - offset->time_s < offset_age_s) --offset;
+  trusted_ = offset->q;
+  path_ = {offset->measured.sides, {}};
+  for (; offset != offsets.end(); ++offset) path_.joints.emplace_back(offset->measured.q.tail<2>());
   path_.joints.emplace_back(measured_->q.tail<2>());
 }
 
 void EndoscopeRecovery::measure(VisualController& controller) {
-  state_ = WaitingForMotion{{}, min_images};
+  state_ = Measuring{{}, min_images};
   controller.suspend(HoldReason::endoscope_moved);
+}
+
+MarkerSighting EndoscopeRecovery::sighting(const ImageMeasurement& image) const {
+  return {image.time_s, measured_->q, measured_->rate, *image.camera_from_marker};
 }
 
 std::optional<MarkerSighting> EndoscopeRecovery::sighting_of(const ImageMeasurement& image) const {
   if (!image.camera_from_marker || !measured_ || measured_->stamp_s != image.time_s) return std::nullopt;
-  MarkerSighting seen = sighting(image, *measured_);
+  MarkerSighting seen = sighting(image);
   seen.q += trusted_;
   seen.path_index = path_.joints.size() - 1;
   return seen;
 }
 
-void EndoscopeRecovery::wait_for_motion(WaitingForMotion& waiting, const MarkerSighting& seen,
-                                        VisualController& controller) {
-  Sightings& sightings = waiting.sightings;
-  if (!add(sightings, seen, max_images) || sightings.size() < waiting.fit_at) return;
+void EndoscopeRecovery::collect(Measuring& measuring, const MarkerSighting& seen, VisualController& controller) {
+  Sightings& sightings = measuring.sightings;
+  if (!add(sightings, seen, max_images) || measuring.certain || sightings.size() < measuring.fit_at) return;
   const auto found = fit(sightings);
   const bool contradicts = found && contradicts_itself(*found);
   if (found && !contradicts && is_certain(*found)) {
-    state_ = WaitingForStart{std::move(sightings)};
+    measuring.certain = true;
     return controller.suspend(HoldReason::endoscope_measured);
   }
   if ((!found || contradicts) && blames_rig(controller, Blame::any)) return;
   // The endoscope moved once more: the newer ones may all be of where it is now.
   if (contradicts) sightings.erase(sightings.begin(), sightings.begin() + static_cast<long>(sightings.size() / 2));
-  waiting.fit_at = std::clamp(sightings.size() * 3 / 2, min_images, max_images);
+  measuring.fit_at = std::clamp(sightings.size() * 3 / 2, min_images, max_images);
 }
 
 std::optional<RegistrationFit> EndoscopeRecovery::fit(const Sightings& sightings) const {
   return fit_registration(rig_.camera, rig_.instruments.front().marker, sightings, path_);
 }
 
-void EndoscopeRecovery::start(const WaitingForStart& waiting, VisualController& controller) {
-  const auto found = fit(waiting.sightings);
+void EndoscopeRecovery::start(const Sightings& sightings, VisualController& controller) {
+  const auto found = fit(sightings);
   if (!found || contradicts_itself(*found)) return measure(controller);
   state_ = Watching{};
   agreeing_ = agreed_after;

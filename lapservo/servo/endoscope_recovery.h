@@ -39,12 +39,10 @@ struct Watching {
   int contradicting = 0;       ///< images in a row
   std::deque<Offset> offsets;  ///< while images agreed, in order of time
 };
-struct WaitingForMotion {
+struct Measuring {
   Sightings sightings;     ///< of the motion that the operator makes
   std::size_t fit_at = 0;  ///< so many
-};
-struct WaitingForStart {
-  Sightings sightings;
+  bool certain = false;    ///< by them: waits for a start
 };
 struct WrongRig {
   Explanation why;
@@ -67,7 +65,7 @@ class EndoscopeRecovery {
   int registration() const { return registration_; }
   const std::optional<Rigid3>& camera_from_rcm() const { return camera_from_rcm_; }
   /// The endoscope moved and nobody has said start since, or the rig is wrong: nothing may be sent to the arm.
-  bool moved() const { return !std::holds_alternative<Watching>(state_); }
+  bool moved() const { return !std::holds_alternative<endoscope::Watching>(state_); }
   /// The wrong part of the rig, where joints and images have disagreed from the start: then nothing is measured anew.
   std::optional<Explanation> wrong_rig() const;
   const Instrument& instrument() const { return rig_.instruments[0]; }
@@ -81,32 +79,27 @@ class EndoscopeRecovery {
   void follow(const ServoInput& input, const ControlStep& step, VisualController& controller);
 
  private:
-  using Watching = endoscope::Watching;
-  using WaitingForMotion = endoscope::WaitingForMotion;
-  using WaitingForStart = endoscope::WaitingForStart;
-  using WrongRig = endoscope::WrongRig;
-
   void collect(const ImageMeasurement& image, VisualController& controller);
   enum class Blame { any, named, sign };  ///< whatever of the rig is wrong; one number; one joint's sign
   bool blames_rig(VisualController& controller, Blame wanted);
   bool stepped(const ImageMeasurement& image, bool delay_is_known);
-  void watch(Watching& watching, const ImageMeasurement& image, VisualController& controller);
-  void notice(Watching& watching, VisualController& controller);
+  void watch(endoscope::Watching& watching, const ImageMeasurement& image, VisualController& controller);
+  void notice(const std::deque<endoscope::Offset>& offsets, VisualController& controller);
   void drop_suspicion(VisualController& controller);
-  void trust_before(std::deque<endoscope::Offset> offsets);
-  bool collects() const;
+  void trust_before(const std::deque<endoscope::Offset>& offsets);
   bool follow_joints(const ImageMeasurement& image, VisualController& controller);
-  void trust(Watching& watching, const ServoInput& input, const ControlStep& step);
+  void trust(endoscope::Watching& watching, const ServoInput& input, const ControlStep& step);
   void measure(VisualController& controller);
-  void wait_for_motion(WaitingForMotion& waiting, const MarkerSighting& seen, VisualController& controller);
-  void start(const WaitingForStart& waiting, VisualController& controller);
+  void collect(endoscope::Measuring& measuring, const MarkerSighting& seen, VisualController& controller);
+  void start(const endoscope::Sightings& sightings, VisualController& controller);
   std::optional<RegistrationFit> fit(const endoscope::Sightings& sightings) const;
+  MarkerSighting sighting(const ImageMeasurement& image) const;
   std::optional<MarkerSighting> sighting_of(const ImageMeasurement& image) const;
 
   Rig rig_;
   int registration_ = 0;
   std::optional<Rigid3> camera_from_rcm_;
-  std::variant<Watching, WaitingForMotion, WaitingForStart, WrongRig> state_;
+  std::variant<endoscope::Watching, endoscope::Measuring, endoscope::WrongRig> state_;
   endoscope::Sightings seen_;                    ///< since the loop has gone by this registration
   bool sees_from_start_ = true;                  ///< nothing but that made joints or images doubtful since then
   std::size_t sightings_ = 0, explain_at_ = 0;   ///< how many were added to seen_ that moved; explained at so many

@@ -19,14 +19,14 @@ Eigen::Vector4d both_ends(const Eigen::Vector2d& first, const Eigen::Vector2d& l
 }  // namespace
 
 FeatureModel feature_model(const Rig& rig) {
-  const Instrument& instrument = rig.instruments.at(0);
-  return instrument.camera_from_rcm ? feature_model(rig, *instrument.camera_from_rcm) : FeatureModel();
+  return feature_model(rig, rig.instruments.at(0).camera_from_rcm);
 }
 
-FeatureModel feature_model(const Rig& rig, const Rigid3& camera_from_rcm) {
-  const ImageModel image{rig.camera, rig.instruments.at(0).marker, camera_from_rcm};
+FeatureModel feature_model(const Rig& rig, const std::optional<Rigid3>& camera_from_rcm) {
+  if (!camera_from_rcm) return {};
+  const ImageModel image{rig.camera, rig.instruments.at(0).marker, *camera_from_rcm};
   return [image](const Eigen::Vector4d& q) -> std::optional<FeatureState> {
-    const auto [reason, point] = feature_map(image, JointVector::from_vector(q));
+    const auto point = feature_map(image, JointVector::from_vector(q));
     if (!point) return std::nullopt;
     return FeatureState{point->f, point->jacobian, both_ends(point->ideal_px[0], point->ideal_px[3]),
                         point->ends_jacobian};

@@ -16,7 +16,7 @@ namespace lapservo {
 FeatureModel feature_model(const Rig& rig);
 
 /// The same, were its camera_from_rcm that one.
-FeatureModel feature_model(const Rig& rig, const Rigid3& camera_from_rcm);
+FeatureModel feature_model(const Rig& rig, const std::optional<Rigid3>& camera_from_rcm);
 
 /// The controller's measurement from an observation. Valid only when all four features are known, r from `rcm_px`, the
 /// RCM's image in ideal pixels. The covariance is that of the fitted points, propagated to the features.

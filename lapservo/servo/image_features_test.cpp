@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/core/error.h"
-#include "lapservo/geometry/invertible.h"
+#include "lapservo/geometry/field_of_view.h"
 #include "lapservo/kinematics/centre_line.h"
 #include "lapservo/kinematics/feature_map.h"
 #include "lapservo/kinematics/rcm_kinematics.h"
@@ -44,8 +44,8 @@ TEST(ImageFeatures, TheModelShowsWhatIsObserved) {
   EXPECT_LT((seen.ends_px - state.ends_px).norm(), 1e-8);
   const auto point = feature_map({rig.camera, rig.instruments[0].marker, *rig.instruments[0].camera_from_rcm},
                                  JointVector::from_vector(somewhere));
-  EXPECT_EQ(state.jacobian, point.point->jacobian);
-  EXPECT_EQ(state.ends_jacobian, point.point->ends_jacobian);
+  EXPECT_EQ(state.jacobian, point->jacobian);
+  EXPECT_EQ(state.ends_jacobian, point->ends_jacobian);
 }
 
 // The log keeps one half of it, and the filter factors it. Points that all move with one unknown leave it singular but
@@ -90,32 +90,19 @@ TEST(ImageFeatures, WhatIsNotOkIsNotFound) {
   }
 }
 
-// Every ideal point of the window lies in the image, also through a distorting lens.
-TEST(ImageFeatures, TheWindowLiesInThePicture) {
-  Camera camera = testing::paper_test_rig().camera;
-  for (const double k1 : {0.0, -0.25, 0.15}) {
-    camera.distortion = {k1, 0, 0, 0, 0};
-    const ImageWindow window = image_window(camera, 20);
-    for (const double u : {window.u_min_px, window.u_max_px})
-      for (const double v : {window.v_min_px, window.v_max_px}) {
-        const Eigen::Vector2d raw = camera.raw_from_ideal({u, v});
-        EXPECT_GE(raw.minCoeff(), 19.9) << k1;
-        EXPECT_LE(raw.x(), camera.width_px - 1 - 19.9) << k1;
-        EXPECT_LE(raw.y(), camera.height_px - 1 - 19.9) << k1;
-      }
-  }
-}
-
 TEST(ImageFeatures, AMarginThatIsNoneIsRefused) {
   const Camera camera = testing::paper_test_rig().camera;
   for (const double margin_px : {-1.0, 360.0, double{NAN}, double{INFINITY}})
     EXPECT_THROW((void)image_window(camera, margin_px), InputError) << margin_px;
 }
 
-TEST(ImageFeatures, TheWindowLeavesOutCornersThatTheLensFolds) {
+// Every ideal point of the window, also through a lens that distorts; corners that it folds are left out.
+TEST(ImageFeatures, TheWindowLiesInThePicture) {
   Camera camera = testing::paper_test_rig().camera;
+  camera.distortion[0] = 0.15;
+  bool folds = false;
   for (double& k1 = camera.distortion[0]; is_invertible(camera); k1 -= 0.01) {
-    if (is_invertible_everywhere(camera)) continue;
+    folds |= !is_invertible_everywhere(camera);
     const ImageWindow window = image_window(camera, 20);
     EXPECT_GT(window.u_max_px - window.u_min_px, 0.3 * camera.width_px) << k1;
     for (const double u : {window.u_min_px, window.u_max_px})
@@ -125,7 +112,7 @@ TEST(ImageFeatures, TheWindowLeavesOutCornersThatTheLensFolds) {
         EXPECT_LE((camera.ideal_from_raw(raw).value() - Eigen::Vector2d(u, v)).norm(), 1e-6) << k1;
       }
   }
-  EXPECT_LT(camera.distortion[0], -0.1) << "the loop saw none";
+  EXPECT_TRUE(folds);
 }
 
 }  // namespace

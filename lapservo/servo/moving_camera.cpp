@@ -14,12 +14,6 @@ namespace {
 constexpr double added_share = 0.01;  // of an endoscope's motion, to sigma
 constexpr double step_s = 0.03;       // of differences by time
 
-Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& v) {
-  Eigen::Matrix3d matrix;
-  matrix << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return matrix;
-}
-
 }  // namespace
 
 Instrument before_moved_camera(Instrument first, const Rigid3& first_from_camera) {
@@ -31,7 +25,7 @@ Instrument before_moved_camera(Instrument first, const Rigid3& first_from_camera
   const double sigma_m = added_share * first_from_camera.translation.norm();
   const double sigma_rad = added_share * rotation_vector_of(first_from_camera.rotation).norm();
   Matrix by_motion = Matrix::Identity();
-  by_motion.topRightCorner<3, 3>() = -cross_matrix(moved.translation);
+  by_motion.topRightCorner<3, 3>() = Eigen::Matrix3d::Identity().colwise().cross(moved.translation);
   Eigen::Vector<double, 6> added;
   added << Eigen::Vector3d::Constant(sigma_m * sigma_m), Eigen::Vector3d::Constant(sigma_rad * sigma_rad);
   first.registration_covariance =
@@ -47,7 +41,7 @@ MovingCamera::MovingCamera(const EndoscopePose& endoscope, const Rig& rig, const
 
 void MovingCamera::use(const std::optional<Rigid3>& first_from_rcm) {
   first_from_rcm_ = first_from_rcm;
-  if (first_from_rcm) first_ = feature_model(rig_, *first_from_rcm);
+  first_ = feature_model(rig_, first_from_rcm);
 }
 
 void MovingCamera::carry(ServoInput& input, double since_s, const Trajectory& trajectory,

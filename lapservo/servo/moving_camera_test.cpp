@@ -32,11 +32,15 @@ ServoInput input_at(double time_s, const JointVector& q) {
   return input;
 }
 
-// As the first one would see them, with their derivatives.
-TEST(MovingCamera, ImagesAreCarriedToThoseOfTheFirstPlace) {
+class MovingCameraTest : public ::testing::Test {
+ protected:
   const Rig rig = testing::small_test_rig();
-  const Evenly endoscope;
-  MovingCamera camera(endoscope, rig, {});
+  Evenly endoscope;
+  MovingCamera camera{endoscope, rig, {}};
+};
+
+// As the first one would see them, with their derivatives.
+TEST_F(MovingCameraTest, ImagesAreCarriedToThoseOfTheFirstPlace) {
   const Rigid3& first_from_rcm = *rig.instruments[0].camera_from_rcm;
   const FeatureModel first = feature_model(rig);
   Random random(1);
@@ -67,10 +71,7 @@ TEST(MovingCamera, ImagesAreCarriedToThoseOfTheFirstPlace) {
 
 // A goal that rests in the moving image moves in that of the first place: an arm that follows it keeps it in the moving
 // image, and its rate and acceleration are its derivatives.
-TEST(MovingCamera, GoalsMoveAsTheCameraDoes) {
-  const Rig rig = testing::small_test_rig();
-  const Evenly endoscope;
-  MovingCamera camera(endoscope, rig, {});
+TEST_F(MovingCameraTest, GoalsMoveAsTheCameraDoes) {
   const FeatureModel first = feature_model(rig);
   const Eigen::Vector4d goal = first(there.vector())->features;
   const auto desired_at = [&](double time_s) {
@@ -90,10 +91,7 @@ TEST(MovingCamera, GoalsMoveAsTheCameraDoes) {
   }
 }
 
-TEST(MovingCamera, WhereTheEndoscopeIsNotKnownTheGoalRestsAndNoImageCounts) {
-  const Rig rig = testing::small_test_rig();
-  const Evenly endoscope;
-  MovingCamera camera(endoscope, rig, {});
+TEST_F(MovingCameraTest, WhereTheEndoscopeIsNotKnownTheGoalRestsAndNoImageCounts) {
   ServoInput input = input_at(-1, there);
   input.image.emplace();
   input.desired = {feature_model(rig)(there.vector())->features, Eigen::Vector4d::Ones(), Eigen::Vector4d::Ones()};
@@ -105,10 +103,7 @@ TEST(MovingCamera, WhereTheEndoscopeIsNotKnownTheGoalRestsAndNoImageCounts) {
 }
 
 // Joints that are not known at first leave nothing behind; a goal that no q shows holds the arm.
-TEST(MovingCamera, GoesOnAfterJointsThatAreNoneAndGoalsOutOfReach) {
-  const Rig rig = testing::small_test_rig();
-  const Evenly endoscope;
-  MovingCamera camera(endoscope, rig, {});
+TEST_F(MovingCameraTest, GoesOnAfterJointsThatAreNoneAndGoalsOutOfReach) {
   const Eigen::Vector4d goal = feature_model(rig)(there.vector())->features,
                         beyond = goal + Eigen::Vector4d(0, 0, -200, 0);
   const auto image_counts = [&](const JointVector& q, const Eigen::Vector4d& desired) {
@@ -125,10 +120,7 @@ TEST(MovingCamera, GoesOnAfterJointsThatAreNoneAndGoalsOutOfReach) {
 }
 
 // A goal is looked for from where the arm is when the loop begins to move it, not from where others had it.
-TEST(MovingCamera, GoalsAreLookedForFromWhereTheArmIsEnabled) {
-  const Rig rig = testing::small_test_rig();
-  const Evenly endoscope;
-  MovingCamera camera(endoscope, rig, {});
+TEST_F(MovingCameraTest, GoalsAreLookedForFromWhereTheArmIsEnabled) {
   const double time_s = 3;
   const FeatureModel here =
       feature_model(rig, endoscope.first_from_camera(time_s)->inverse() * *rig.instruments[0].camera_from_rcm);
@@ -141,12 +133,14 @@ TEST(MovingCamera, GoalsAreLookedForFromWhereTheArmIsEnabled) {
       input.desired.features = goal;
       camera.carry(input, 0, set_point(goal), *endoscope.first_from_camera(time_s));
     }
-    if (q.rho_m > 0) EXPECT_LT((input.desired.features - feature_model(rig)(there.vector())->features).norm(), 1e-6);
+    if (q.rho_m > 0) {
+      EXPECT_LT((input.desired.features - feature_model(rig)(there.vector())->features).norm(), 1e-6);
+    }
   }
 }
 
 // The covariance is that of registrations whose first one, and whose motion, are drawn from their own.
-TEST(MovingCamera, TheMotionsUncertaintyIsAdded) {
+TEST(BeforeMovedCamera, TheMotionsUncertaintyIsAdded) {
   Instrument instrument = testing::small_test_rig().instruments[0];
   instrument.registration_covariance =
       Eigen::Vector<double, 6>(1e-8, 4e-8, 9e-8, 1e-6, 2e-6, 3e-6).asDiagonal().toDenseMatrix();

@@ -68,23 +68,6 @@ TEST(OffsetSteps, IsSilentWhileTheJointsSwing) {
     }
 }
 
-// As slow as 30 mm and 20 degrees in some seconds are: within five images, and for as long as it goes on.
-TEST(OffsetSteps, TellsAnOffsetThatMovesOnAndOn) {
-  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
-    Watched watched(seed);
-    const Eigen::Vector3d per_s(0.15, -0.12, 0.008);
-    int told = 0;
-    for (int i = 1; i <= 60; ++i) {
-      const bool unusual = watched.add(i * period_s * per_s);
-      told += unusual;
-      if (i >= 5 && i <= 10) {
-        EXPECT_TRUE(unusual) << seed << " " << i;
-      }
-    }
-    EXPECT_GT(told, 40) << seed;
-  }
-}
-
 // Its speed grows little from image to image: what it gained is not usual.
 TEST(OffsetSteps, TellsAnOffsetThatGainsSpeedByAndBy) {
   for (const double duration_s : {0.6, 1.0, 2.0, 4.0})
@@ -121,13 +104,6 @@ TEST(OffsetSteps, TellsAJumpForATenthOfASecondOnly) {
   EXPECT_TRUE(watched.add(elsewhere));
   for (int i = 0; i < 7; ++i) watched.add(elsewhere);
   watched.expect_silent(30, elsewhere);
-}
-
-// One image that is off is one.
-TEST(OffsetSteps, GoesOnAfterAnOutlier) {
-  Watched watched(4);
-  EXPECT_TRUE(watched.add({0.01, 0, 0}));
-  watched.expect_silent(30);
 }
 
 // Where images came late before, one more is nothing new.

@@ -12,10 +12,6 @@ namespace {
 constexpr int parts = 4, most_parts = 12;
 constexpr int noisy_after = 10, noiseless_after = 3;
 
-bool comparable(const cv::Mat& a, const cv::Mat& b) {
-  return a.size() == b.size() && a.type() == b.type() && a.data != b.data;
-}
-
 bool same(const cv::Mat& a, const cv::Mat& b) {
   const std::size_t row_bytes = static_cast<std::size_t>(a.cols) * a.elemSize();
   for (int v = 0; v < a.rows; ++v)
@@ -47,7 +43,7 @@ bool differs_in_most_places(const cv::Mat& a, const cv::Mat& b) {
 Repetition PictureRepeats::add(const cv::Mat& bgr) {
   const cv::Mat before = before_;
   before_ = bgr;
-  if (!comparable(before, bgr)) return Repetition::none;
+  if (before.size() != bgr.size() || before.type() != bgr.type() || before.data == bgr.data) return Repetition::none;
   if (same(before, bgr))
     return noiseless_ < noiseless_after && noisy_ >= noisy_after ? Repetition::of_a_noisy_camera
                                                                  : Repetition::possible_at_rest;

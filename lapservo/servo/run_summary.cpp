@@ -8,7 +8,7 @@
 
 #include "lapservo/control/tracking_law.h"
 #include "lapservo/core/angles.h"
-#include "lapservo/rig/registration_text.h"
+#include "lapservo/rig/registration_covariance.h"
 
 namespace lapservo::internal {
 namespace {

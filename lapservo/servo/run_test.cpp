@@ -40,13 +40,10 @@ namespace lapservo::internal {
 namespace {
 
 // The trajectory as the half-size camera sees it.
-Sinusoids small_sinusoids() {
+Trajectory small_trajectory() {
   Sinusoids f = paper_sinusoids();
   f.offset.tail<3>() /= 2, f.amplitude.tail<3>() /= 2;
-  return f;
-}
-Trajectory small_trajectory() {
-  return sinusoids(small_sinusoids());
+  return sinusoids(f);
 }
 
 struct Case {
@@ -200,24 +197,6 @@ PastRun run_case(const Case& c) {
   return std::move(watcher.done);
 }
 
-void expect_within_limits(const PastRun& done, const ControllerConfig& config) {
-  constexpr double slack = 1e-9;
-  std::size_t sent = 0;
-  for (std::size_t i = 1; i < done.records.size(); ++i) {
-    const MotionState &before = done.records[i - 1].decision.control.setpoint,
-                      &now = done.records[i].decision.control.setpoint;
-    if (!done.records[i - 1].decision.send || !done.records[i].decision.send) continue;
-    ++sent;
-    const Eigen::Array4d step = (now.position - before.position).cwiseAbs(),
-                         change = (now.velocity - before.velocity).cwiseAbs();
-    EXPECT_TRUE((step <= config.limits.rate.array() * config.period_s + slack).all()) << i;
-    EXPECT_TRUE((change <= config.limits.acceleration.array() * config.period_s + slack).all()) << i;
-    EXPECT_TRUE((now.position.array() <= config.limits.upper.array() + slack).all()) << i;
-    EXPECT_TRUE((now.position.array() >= config.limits.lower.array() - slack).all()) << i;
-  }
-  EXPECT_GT(2 * sent, done.records.size());
-}
-
 TEST(Run, FollowsThePapersTrajectoryFromARandomStart) {
   for (const std::uint64_t seed : {1, 2}) {
     SCOPED_TRACE(seed);
@@ -234,7 +213,6 @@ TEST(Run, FollowsThePapersTrajectoryFromARandomStart) {
     EXPECT_LE(std::abs(mean[0]), 0.5e-3 / 3);
     EXPECT_LE(mean.tail<3>().cwiseAbs().maxCoeff(), 0.1);
     EXPECT_NEAR(done.records.back().decision.control.delay_s, 0.08, 0.5 / 60);
-    expect_within_limits(done, config_of(testing::small_test_rig(), {}).controller);
   }
 }
 
@@ -318,30 +296,25 @@ std::vector<Blotch> blood() {
   return {{0.5, 0.012, 0.002}, {2.5, 0.02, 0.0015}, {4.5, 0.03, 0.002}, {5.5, 0.008, 0.0015}};
 }
 
-// Images with motion in them: dark for a while; and blurred, veiled, stained and dark at once.
+// Images with motion in them, blurred, veiled and stained, and dark for a while.
 TEST(Run, IsNeverWrongByPicturesThatAreHardToRead) {
-  Case darkened;
-  darkened.duration_s = 5, darkened.dark = Interval{2, 2.6};
-  Case all = darkened;
-  all.change = [](SimulatorConfig& c) {
-    c.endoscope.exposure_s = 0.015, c.render.smoke = 0.35F;
-    c.blotches = blood();
+  Case c;
+  c.duration_s = 5, c.dark = Interval{2, 2.6};
+  c.change = [](SimulatorConfig& config) {
+    config.endoscope.exposure_s = 0.015, config.render.smoke = 0.35F;
+    config.blotches = blood();
   };
-  const ControllerConfig controller = config_of(testing::small_test_rig(), all).controller;
-  for (const Case& c : {darkened, all}) {
-    SCOPED_TRACE(c.change ? "all" : "dark");
-    const PastRun done = run_case(c);
-    for (const Record& record : done.records) {
-      EXPECT_EQ(record.decision.registration, 0);
-      const double time_s = record.input.time_s;
-      if (time_s < c.dark->begin_s + 0.1 + 2 * controller.period_s || time_s > c.dark->end_s + 0.07) continue;
-      EXPECT_EQ(record.decision.control.action, ControlAction::hold) << time_s;
-    }
-    expect_right_where_ok(done, c.latency_s, controller.period_s);
-    expect_within_limits(done, controller);
-    EXPECT_EQ(done.records.back().decision.control.action, ControlAction::track);
-    EXPECT_LT(done.last_px(), 1);
+  const ControllerConfig controller = config_of(testing::small_test_rig(), c).controller;
+  const PastRun done = run_case(c);
+  for (const Record& record : done.records) {
+    EXPECT_EQ(record.decision.registration, 0);
+    const double time_s = record.input.time_s;
+    if (time_s < c.dark->begin_s + 0.1 + 2 * controller.period_s || time_s > c.dark->end_s + 0.07) continue;
+    EXPECT_EQ(record.decision.control.action, ControlAction::hold) << time_s;
   }
+  expect_right_where_ok(done, c.latency_s, controller.period_s);
+  EXPECT_EQ(done.records.back().decision.control.action, ControlAction::track);
+  EXPECT_LT(done.last_px(), 1);
 }
 
 std::vector<LoggedTick> logged(const PastRun& done) {
@@ -388,7 +361,6 @@ void expect_measured_anew(const Rig& rig, const Case& c) {
   // By the first image that shows it, 83 or 100 ms; by the second one where builds' last bits differ.
   EXPECT_LE(*held_s, c.endoscope->duration_s > 0 ? 0.12 : 0.1);
   EXPECT_LE(wrong_s, c.duration_s - endoscope_moves_s - 0.3);
-  expect_within_limits(done, controller);
   if (c.endoscope->duration_s == 0) expect_right_where_ok(done, c.latency_s, controller.period_s);
 }
 
@@ -433,7 +405,6 @@ struct HeldAfter {
       if (!held && shown && record.decision.control.action == ControlAction::hold) held = since_s;
     }
     ASSERT_TRUE(plain && held);
-    expect_within_limits(done, controller);
     ++runs, held_s += *held, plain_s += *held - *plain;
     latest_plain_s = std::max(latest_plain_s, *held - *plain);
     in_time += *held - *plain <= in_time_s + controller.period_s;
@@ -471,18 +442,6 @@ TEST(Run, HoldsAnEndoscopeThatMovesWhenThatIsPlain) {
           after.runs);
       EXPECT_LE(after.plain_s / after.runs, duration_s > 1 ? 0.6 : 0.1 + 1.0 / 60);
     }
-}
-
-TEST(Run, HoldsAnEndoscopeThatMovesSmoothlyAsSoonAsThatIsPlain) {
-  const Rig rig = testing::small_test_rig();
-  Random random(1);
-  for (const double duration_s : {1.0, 2.0}) {
-    SCOPED_TRACE(duration_s);
-    HeldAfter after;
-    after.add(rig, {.duration_s = endoscope_moves_s + duration_s / 2,
-                    .endoscope = random_motion(rig, duration_s, MotionProfile::smooth, random)});
-    EXPECT_EQ(after.in_time, 1);
-  }
 }
 
 // Turned by 0.2 rad and moved by 20 mm in 4 s, where an arm that follows stays within its limits and its marker in the
@@ -554,7 +513,6 @@ TEST(Run, TracksOnWhileAnArmMovesTheEndoscope) {
         EXPECT_LE(after[0], 0.5e-3);
         EXPECT_LE(after.tail<2>().maxCoeff(), 0.2);
         EXPECT_LE(after[1], arm_error_rad > 0 ? 1.5 : 0.3);
-        expect_within_limits(done, controller);
       }
 }
 
@@ -737,11 +695,11 @@ TEST(Run, NeedsTheLimitsOfAnArmThatIsNotSimulated) {
   EXPECT_EQ(complaint(), "");
 }
 
-// An arm whose joints a rig reads with other signs and offsets: its q is sign * q + offset.
-class MisreadArm : public SimulatedArm {
+// An arm whose joints a rig reads with other signs, and right where it starts.
+class MirroredArm : public SimulatedArm {
  public:
-  MisreadArm(const Eigen::Vector4d& sign, const Eigen::Vector4d& offset, const Eigen::Vector4d& q)
-      : sign_(sign), offset_(offset), arm_(ArmConfig{}, q) {}
+  explicit MirroredArm(const Eigen::Vector4d& sign)
+      : sign_(sign), offset_(start.vector() - sign.cwiseProduct(start.vector())), arm_(ArmConfig{}, start.vector()) {}
   void servo_jp(const Eigen::Vector4d& setpoint) override { arm_.servo_jp(sign_.cwiseProduct(setpoint - offset_)); }
   void step(double dt_s) override { arm_.step(dt_s); }
   Eigen::Vector4d measured_jp() const override { return sign_.cwiseProduct(arm_.measured_jp()) + offset_; }
@@ -755,51 +713,38 @@ class MisreadArm : public SimulatedArm {
   Arm arm_;
 };
 
-struct Misread {
-  Eigen::Vector4d sign = Eigen::Vector4d::Ones(), offset = Eigen::Vector4d::Zero();
-  Eigen::Quaterniond turned = Eigen::Quaterniond::Identity();  ///< camera_from_rcm in the rig
-  double duration_s = 6;
-};
-
 // Held, and the operator swings the joints of the released arm.
-std::string wrong_rig_of(const Misread& misread) {
+std::string wrong_rig_of(const Eigen::Vector4d& sign, const Eigen::Quaterniond& turned, double duration_s) {
   const Rig rig = testing::small_test_rig();
   RunConfig config = config_of(rig, {});
   Rigid3& believed = *config.rig.instruments[0].camera_from_rcm;
-  believed.rotation = misread.turned * believed.rotation;
+  believed.rotation = turned * believed.rotation;
   config.controller.limits.lower.setConstant(-7), config.controller.limits.upper.setConstant(7);
-  Simulator simulator(rig, {}, std::make_unique<MisreadArm>(misread.sign, misread.offset, start.vector()));
+  Simulator simulator(rig, {}, std::make_unique<MirroredArm>(sign));
   OperatedArm arm(simulator);
   Watcher watcher(rig, simulator, &arm);
-  run(arm, simulator, simulator, config, small_trajectory(), misread.duration_s, watcher);
+  run(arm, simulator, simulator, config, small_trajectory(), duration_s, watcher);
   std::string last;
   for (const Record& record : watcher.done.records) {
     const ServoDecision& decision = record.decision;
     EXPECT_NE(decision.control.reason, HoldReason::endoscope_measured) << record.input.time_s;
     EXPECT_FALSE(decision.send && decision.control.reason == HoldReason::wrong_rig) << record.input.time_s;
-    if (decision.control.reason == HoldReason::psi_contradicted) last = to_string(decision.control.reason);
     if (!decision.remedy.empty()) last = decision.remedy;
   }
   return last;
 }
 
+// Offsets: Disagreement.
 TEST(Run, NamesWhatOfTheRigWasWrongFromTheStart) {
   const std::array<std::string, 4> names{"outer_yaw", "outer_pitch", "outer_insertion", "outer_roll"};
   constexpr std::array mirrored_s{1.5, 5.5, 3.0, 2.0};
-  const std::string remedy = " is wrong: run lapservo calibrate registration";
-  const Eigen::Vector4d shift(-0.8, 0.7, 0.06, 1.5);
   for (std::size_t k = 0; k < 4; ++k) {
-    const auto joint = static_cast<Eigen::Index>(k);
-    Misread mirrored, shifted;
-    mirrored.sign[joint] = -1, mirrored.offset[joint] = 2 * start.vector()[joint], mirrored.duration_s = mirrored_s[k];
-    shifted.offset[joint] = shift[joint];
-    EXPECT_NE(wrong_rig_of(mirrored).find("joints.sign of " + names[k] + " is wrong"), std::string::npos);
-    // Where psi does not agree nothing moves that would distinguish its sign from its offset.
-    EXPECT_EQ(wrong_rig_of(shifted), k == 3 ? "psi_contradicted" : "joints.offset of " + names[k] + remedy);
+    Eigen::Vector4d sign = Eigen::Vector4d::Ones();
+    sign[static_cast<Eigen::Index>(k)] = -1;
+    const std::string named = wrong_rig_of(sign, Eigen::Quaterniond::Identity(), mirrored_s[k]);
+    EXPECT_NE(named.find("joints.sign of " + names[k] + " is wrong"), std::string::npos) << named;
   }
-  Misread turned;
-  turned.turned = rotation_by({0.3, 0.4, -0.3});
-  EXPECT_EQ(wrong_rig_of(turned),
+  EXPECT_EQ(wrong_rig_of(Eigen::Vector4d::Ones(), rotation_by({0.3, 0.4, -0.3}), 6),
             "camera_from_rcm is wrong, or the camera shows another arm: run lapservo calibrate registration");
 }
 
@@ -875,13 +820,8 @@ std::string refusal_of(const Refused& refused) {
   return said;
 }
 
-TEST(Run, RefusesWhatCanNotBeFollowedNamingTimeAndLimit) {
+TEST(Run, RefusesWhatCanNotBeFollowed) {
   EXPECT_EQ(refusal_of({}), "");
-  Sinusoids fast = small_sinusoids();
-  fast.omega_rad_s.setConstant(12);
-  const std::string complaint = refusal_of({.trajectory = sinusoids(fast)});
-  EXPECT_EQ(complaint.find("fast.csv: can't be followed at "), 0U) << complaint;
-  EXPECT_NE(complaint.find(" s: limits.rate"), std::string::npos) << complaint;
   // At once, and where the arm has been homed to.
   for (const double homing_s : {0.0, 0.3}) {
     EXPECT_EQ(refusal_of({.trajectory = set_point({0.9, 397, 182, 106}), .homing_s = homing_s}), "");

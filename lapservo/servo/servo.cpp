@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <string>
 #include <utility>
 
 #include <fmt/format.h>
@@ -63,10 +62,10 @@ bool orderly(const ControlStep& control) {
 
 // The delay that a calibration measured is where its estimate begins.
 ControllerConfig with_delay_of(const Instrument& instrument, ControllerConfig config) {
-  constexpr double longest_s = DelayEstimator::step_s * (DelayEstimator::candidates - 1);
   constexpr double earliest_s = -0.02;  // noise of one that is 0
   const double delay_s = instrument.image_delay_s.value_or(-1);
-  if (delay_s >= earliest_s && delay_s <= longest_s) config.observer.initial_delay_s = std::max(0.0, delay_s);
+  if (delay_s >= earliest_s && delay_s <= DelayEstimator::longest_s)
+    config.observer.initial_delay_s = std::max(0.0, delay_s);
   return config;
 }
 
@@ -106,7 +105,9 @@ ServoDecision Servo::decide(const ServoInput& input) {
   if (input.joints.started) controller_.restart_tests();
   decision.control = controller_.step(input.time_s, q, input.image, input.desired, input.readings);
   if (recovery_) recovery_->doubt(decision.control.reason, controller_);
-  watch_registration(input);
+  // A marker that is hidden in part may be seen without q for a few images; a wrong registration is there in all.
+  if (registered_ && input.image && input.image->found)
+    images_contradicting_ = input.image->q ? 0 : std::min(images_contradicting_ + 1, contradicted_after);
   decision.registration_contradicted = images_contradicting_ >= contradicted_after;
   // The reading before may have been a wild one, from which nothing is to be sent.
   if (begins_ && controller_.has_measured()) {
@@ -125,12 +126,6 @@ ServoDecision Servo::decide(const ServoInput& input) {
   // Setpoints stay where the arm is, so that nothing jumps when it is to move again.
   if (std::isfinite(input.time_s) && q.allFinite()) controller_.reset(input.time_s, q);
   return decision;
-}
-
-// A marker that is hidden in part may be seen without q for a few images; a wrong registration is there in all of them.
-void Servo::watch_registration(const ServoInput& input) {
-  if (!registered_ || !input.image || !input.image->found) return;
-  images_contradicting_ = input.image->q ? 0 : std::min(images_contradicting_ + 1, contradicted_after);
 }
 
 void Servo::start_anew_when_at_rest(const ServoInput& input, HoldReason reason) {

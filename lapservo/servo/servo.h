@@ -29,7 +29,6 @@ class Servo {
  private:
   ServoDecision decide(const ServoInput& input);
   void start_anew_when_at_rest(const ServoInput& input, HoldReason reason);
-  void watch_registration(const ServoInput& input);
 
   VisualController controller_;
   std::array<std::string, 4> names_{"theta", "phi", "rho", "psi"};  ///< of the joints

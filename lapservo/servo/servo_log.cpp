@@ -1,11 +1,9 @@
 #include "lapservo/servo/servo_log.h"
 
 #include <array>
-#include <cerrno>
 #include <cmath>
 #include <cstdlib>
 #include <limits>
-#include <string>
 #include <utility>
 
 #include <fmt/format.h>
@@ -27,77 +25,45 @@ constexpr std::array<std::string_view, 3> positions{"x_m", "y_m", "z_m"};
 constexpr Names rotations{"qx", "qy", "qz", "qw"};
 constexpr Names ends{"e0_u_px", "e0_v_px", "e3_u_px", "e3_v_px"};
 
-template <std::size_t N>
-void name(std::vector<std::string>& columns, const char* prefix, const std::array<std::string_view, N>& names) {
-  for (const std::string_view each : names) columns.push_back(prefix + std::string(each));
+// The shortest text that reads back as the same number.
+std::string text_of(double number) {
+  return fmt::format("{}", number);
 }
 
-// The shortest text that reads back as the same number.
-void write(std::vector<std::string>& fields, double number) {
-  fields.push_back(fmt::format("{}", number));
-}
-void write(std::vector<std::string>& fields, const Eigen::Vector4d& numbers) {
-  for (const double number : numbers) write(fields, number);
-}
-void leave_empty(std::vector<std::string>& fields, int count) {
-  fields.resize(fields.size() + static_cast<std::size_t>(count));
-}
+// The fields of a row, or the names of its columns.
+struct Fields {
+  bool names = false;
+  std::vector<std::string> all{};
+
+  void add(std::string_view name, std::string_view text) { all.emplace_back(names ? name : text); }
+  // Empty where there are none.
+  template <std::size_t N>
+  void add(std::string_view prefix, const std::array<std::string_view, N>& each, const double* numbers) {
+    for (std::size_t i = 0; i < N; ++i)
+      all.push_back(names ? fmt::format("{}{}", prefix, each[i]) : numbers ? text_of(numbers[i]) : "");
+  }
+  void add(std::string_view prefix, const std::optional<Rigid3>& pose) {
+    add(prefix, positions, pose ? pose->translation.data() : nullptr);
+    add(prefix, rotations, pose ? pose->rotation.coeffs().data() : nullptr);
+  }
+};
 
 std::string covariance_column(int row, int column) {
   return fmt::format("seen_cov_{}{}", row, column);
 }
 
-std::vector<std::string> input_columns() {
-  std::vector<std::string> columns{"time_s", "arm_state", "arm_blocked", "arm_follows", "arm_started", "joint_time_s"};
-  name(columns, "joint_", joints);
-  columns.emplace_back("readings");
-  columns.insert(columns.end(), {"image", "image_time_s", "image_registration", "image_repetition"});
-  name(columns, "seen_", features);
+void add_image(Fields& fields, const std::optional<ImageMeasurement>& image) {
+  const ImageMeasurement* seen = image && (image->found || image->camera_from_marker) ? &*image : nullptr;
+  fields.add("image", !image ? "none" : !seen ? "lost" : image->found ? "found" : "marker");
+  fields.add("image_time_s", image ? text_of(image->time_s) : "");
+  fields.add("image_registration", image ? fmt::format("{}", image->registration) : "");
+  fields.add("image_repetition", image ? to_string(image->repetition) : "");
+  fields.add("seen_", features, seen ? seen->features.data() : nullptr);
   for (int i = 0; i < 4; ++i)
-    for (int j = i; j < 4; ++j) columns.push_back(covariance_column(i, j));
-  name(columns, "seen_", ends);
-  name(columns, "seen_", joints);
-  name(columns, "seen_marker_", positions);
-  name(columns, "seen_marker_", rotations);
-  name(columns, "desired_", features);
-  name(columns, "desired_", rates);
-  name(columns, "desired_", accelerations);
-  return columns;
-}
-
-std::vector<std::string> make_decision_columns() {
-  std::vector<std::string> columns{"action", "reason", "send", "limited", "delay_s", "registration"};
-  name(columns, "camera_from_rcm_", positions);
-  name(columns, "camera_from_rcm_", rotations);
-  name(columns, "velocity_", joint_rates);
-  name(columns, "setpoint_", joints);
-  name(columns, "setpoint_", joint_rates);
-  name(columns, "estimated_", features);
-  name(columns, "estimated_", joints);
-  name(columns, "error_", features);
-  return columns;
-}
-
-void write(std::vector<std::string>& fields, const Rigid3& pose) {
-  for (const double number : pose.translation) write(fields, number);
-  write(fields, Eigen::Vector4d(pose.rotation.coeffs()));
-}
-
-void write_image(std::vector<std::string>& fields, const std::optional<ImageMeasurement>& image) {
-  constexpr int numbers = 4 + 10 + 4 + 4, of_marker = 7;
-  fields.emplace_back(!image ? "none" : image->found ? "found" : image->camera_from_marker ? "marker" : "lost");
-  if (!image) return leave_empty(fields, 3 + numbers + of_marker);
-  write(fields, image->time_s);
-  fields.push_back(fmt::format("{}", image->registration));
-  fields.emplace_back(to_string(image->repetition));
-  if (!image->found && !image->camera_from_marker) return leave_empty(fields, numbers + of_marker);
-  write(fields, image->features);
-  for (int i = 0; i < 4; ++i)
-    for (int j = i; j < 4; ++j) write(fields, image->covariance(i, j));
-  write(fields, image->ends_px);
-  image->q ? write(fields, *image->q) : leave_empty(fields, 4);
-  if (!image->camera_from_marker) return leave_empty(fields, of_marker);
-  write(fields, *image->camera_from_marker);
+    for (int j = i; j < 4; ++j) fields.add(covariance_column(i, j), seen ? text_of(seen->covariance(i, j)) : "");
+  fields.add("seen_", ends, seen ? seen->ends_px.data() : nullptr);
+  fields.add("seen_", joints, seen && seen->q ? seen->q->data() : nullptr);
+  fields.add("seen_marker_", seen ? seen->camera_from_marker : std::nullopt);
 }
 
 // time_s theta_rad phi_rad rho_m psi_rad; time_s ...
@@ -109,21 +75,56 @@ std::string text_of(const std::vector<JointReading>& readings) {
   return text;
 }
 
-std::vector<std::string> input_fields(const ServoInput& input) {
-  std::vector<std::string> fields;
-  write(fields, input.time_s);
-  fields.emplace_back(to_string(input.joints.operating_state));
-  fields.emplace_back(to_string(input.joints.blocked));
-  fields.emplace_back(input.joints.follows ? "1" : "0");
-  fields.emplace_back(input.joints.started ? "1" : "0");
-  write(fields, input.joints.time_s);
-  write(fields, input.joints.q.vector());
-  fields.push_back(text_of(input.readings));
-  write_image(fields, input.image);
-  write(fields, input.desired.features);
-  write(fields, input.desired.rate);
-  write(fields, input.desired.acceleration);
-  return fields;
+void add_input(Fields& fields, const ServoInput& input) {
+  fields.add("time_s", text_of(input.time_s));
+  fields.add("arm_state", to_string(input.joints.operating_state));
+  fields.add("arm_blocked", to_string(input.joints.blocked));
+  fields.add("arm_follows", input.joints.follows ? "1" : "0");
+  fields.add("arm_started", input.joints.started ? "1" : "0");
+  fields.add("joint_time_s", text_of(input.joints.time_s));
+  fields.add("joint_", joints, input.joints.q.vector().data());
+  fields.add("readings", text_of(input.readings));
+  add_image(fields, input.image);
+  fields.add("desired_", features, input.desired.features.data());
+  fields.add("desired_", rates, input.desired.rate.data());
+  fields.add("desired_", accelerations, input.desired.acceleration.data());
+}
+
+void add_decision(Fields& fields, const ServoDecision& decision) {
+  const ControlStep& control = decision.control;
+  const Estimate* estimate = control.estimate ? &*control.estimate : nullptr;
+  fields.add("action", to_string(control.action));
+  fields.add("reason", to_string(control.reason));
+  fields.add("send", decision.send ? "1" : "0");
+  fields.add("limited", control.limited ? "1" : "0");
+  fields.add("delay_s", text_of(control.delay_s));
+  fields.add("registration", fmt::format("{}", decision.registration));
+  fields.add("camera_from_rcm_", decision.camera_from_rcm);
+  fields.add("velocity_", joint_rates, control.velocity.data());
+  fields.add("setpoint_", joints, control.setpoint.position.data());
+  fields.add("setpoint_", joint_rates, control.setpoint.velocity.data());
+  fields.add("estimated_", features, estimate ? estimate->features.data() : nullptr);
+  fields.add("estimated_", joints, estimate ? estimate->q.data() : nullptr);
+  fields.add("error_", features, estimate ? control.error.data() : nullptr);
+}
+
+std::string row_of(Fields fields, long tick, const ServoInput& input, const ServoDecision& decision,
+                   const std::optional<InstrumentTruth>& truth) {
+  fields.add("tick", fmt::format("{}", tick));
+  add_input(fields, input);
+  add_decision(fields, decision);
+  fields.add("true_", joints, truth ? truth->q.data() : nullptr);
+  fields.add("true_", features, truth && truth->features ? truth->features->data() : nullptr);
+  return fmt::format("{}", fmt::join(fields.all, ","));
+}
+
+const std::vector<std::string>& decision_columns() {
+  static const std::vector<std::string> columns = [] {
+    Fields names{true};
+    add_decision(names, {});
+    return names.all;
+  }();
+  return columns;
 }
 
 // Fields of one row by name, non-finite numbers included: they are what the loop has to cope with.
@@ -145,9 +146,10 @@ class Row {
     if (field != "0" && field != "1") complain(column, "0 or 1");
     return field == "1";
   }
-  Eigen::Vector4d numbers(const char* prefix, const Names& names) const {
-    Eigen::Vector4d values;
-    for (int i = 0; i < 4; ++i) values[i] = number(prefix + std::string(names[static_cast<std::size_t>(i)]));
+  template <std::size_t N>
+  Eigen::Vector<double, N> numbers(const std::string& prefix, const std::array<std::string_view, N>& names) const {
+    Eigen::Vector<double, N> values;
+    for (std::size_t i = 0; i < N; ++i) values[static_cast<Eigen::Index>(i)] = number(prefix + std::string(names[i]));
     return values;
   }
   [[noreturn]] void complain(const std::string& column, const char* expected) const {
@@ -201,8 +203,7 @@ std::optional<ImageMeasurement> read_image(const Row& row) {
   if (!row.text("seen_theta_rad").empty()) image.q = row.numbers("seen_", joints);
   if (row.text("seen_marker_x_m").empty()) return image;
   Rigid3& seen = image.camera_from_marker.emplace();
-  for (int i = 0; i < 3; ++i)
-    seen.translation[i] = row.number("seen_marker_" + std::string(positions[static_cast<std::size_t>(i)]));
+  seen.translation = row.numbers("seen_marker_", positions);
   seen.rotation.coeffs() = row.numbers("seen_marker_", rotations);
   return image;
 }
@@ -228,42 +229,12 @@ ServoInput read_input(const Row& row) {
   return input;
 }
 
-std::string joined(const std::vector<std::string>& fields) {
-  return fmt::format("{}", fmt::join(fields, ","));
-}
-
-std::string header() {
-  std::vector<std::string> truth;
-  name(truth, "true_", joints);
-  name(truth, "true_", features);
-  return fmt::format("tick,{},{},{}", joined(input_columns()), joined(decision_columns()), joined(truth));
-}
-
 }  // namespace
 
-const std::vector<std::string>& decision_columns() {
-  static const std::vector<std::string> columns = make_decision_columns();
-  return columns;
-}
-
 std::vector<std::string> decision_fields(const ServoDecision& decision) {
-  const ControlStep& control = decision.control;
-  std::vector<std::string> fields{std::string(to_string(control.action)), std::string(to_string(control.reason)),
-                                  decision.send ? "1" : "0", control.limited ? "1" : "0"};
-  write(fields, control.delay_s);
-  fields.push_back(fmt::format("{}", decision.registration));
-  decision.camera_from_rcm ? write(fields, *decision.camera_from_rcm) : leave_empty(fields, 7);
-  write(fields, control.velocity);
-  write(fields, control.setpoint.position);
-  write(fields, control.setpoint.velocity);
-  if (control.estimate) {
-    write(fields, control.estimate->features);
-    write(fields, control.estimate->q);
-    write(fields, control.error);
-  } else {
-    leave_empty(fields, 12);
-  }
-  return fields;
+  Fields fields;
+  add_decision(fields, decision);
+  return fields.all;
 }
 
 InstrumentTruth truth_at(const FeatureModel& true_model, const JointVector& q) {
@@ -273,11 +244,10 @@ InstrumentTruth truth_at(const FeatureModel& true_model, const JointVector& q) {
 }
 
 ServoLog::ServoLog(const std::filesystem::path& path)
-    : path_(path), file_(path, header()), thread_([this] { write_rows(); }) {}
+    : path_(path), file_(path, row_of({.names = true}, 0, {}, {}, {})), thread_([this] { write_rows(); }) {}
 
 ServoLog::~ServoLog() {
   rows_.close();
-  if (thread_.joinable()) thread_.join();
 }
 
 void ServoLog::write_rows() {
@@ -298,12 +268,7 @@ void ServoLog::commit() {
 
 void ServoLog::add(const ServoInput& input, const ServoDecision& decision,
                    const std::optional<InstrumentTruth>& truth) {
-  std::vector<std::string> fields;
-  truth ? write(fields, truth->q) : leave_empty(fields, 4);
-  truth && truth->features ? write(fields, *truth->features) : leave_empty(fields, 4);
-  std::string row = fmt::format("{},{},{},{}", tick_++, joined(input_fields(input)), joined(decision_fields(decision)),
-                                joined(fields));
-  if (rows_.try_push(std::move(row))) return;
+  if (rows_.try_push(row_of({}, tick_++, input, decision, truth))) return;
   if (rows_.closed() && failure_) std::rethrow_exception(failure_);
   throw InputError(path_.string(), fmt::format("the disk is too slow: {} rows wait", most_waiting));
 }

@@ -48,16 +48,16 @@ class ServoLog {
   long tick_ = 0;
   BoundedQueue<std::string> rows_{most_waiting};
   std::exception_ptr failure_;  ///< set before rows_ is cancelled
-  std::thread thread_;          ///< last: it uses the others
+  std::jthread thread_;         ///< last: it uses the others
 };
 
 /// A row of a log: the inputs, and the decision as it was written.
 struct LoggedTick {
   ServoInput input;
-  std::vector<std::string> decision;  ///< fields, in the order of decision_columns()
+  std::vector<std::string> decision;  ///< as decision_fields() has it
 };
 
-const std::vector<std::string>& decision_columns();
+/// The decision's fields of a row.
 std::vector<std::string> decision_fields(const ServoDecision& decision);
 
 /// Throws InputError naming file, line and column.

@@ -4,7 +4,6 @@
 #include <atomic>
 #include <cmath>
 #include <fcntl.h>
-#include <limits>
 #include <optional>
 #include <string>
 #include <sys/stat.h>
@@ -113,13 +112,13 @@ TEST(ServoLog, KeepsWhatIsNotANumber) {
   const testing::TemporaryFolder folder;
   Record record;
   record.decision.control.reason = HoldReason::non_finite;
-  record.input.joints.q = {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), 0, -0.0};
+  record.input.joints.q = {NAN, INFINITY, 0, -0.0};
   ServoLog log(folder / "log.csv");
   log.add(record.input, record.decision, record.truth);
   log.commit();
   const Eigen::Vector4d q = read_servo_log(folder / "log.csv")[0].input.joints.q.vector();
   EXPECT_TRUE(std::isnan(q[0]));
-  EXPECT_EQ(q[1], std::numeric_limits<double>::infinity());
+  EXPECT_EQ(q[1], double{INFINITY});
   EXPECT_TRUE(std::signbit(q[3]));
 }
 

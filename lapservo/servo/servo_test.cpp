@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include <gtest/gtest.h>
@@ -43,7 +42,7 @@ class MovedEndoscope {
 
   ServoDecision step() {
     if (!silent) joints_ = {time_s_, JointVector::from_vector(q_ + encoder_off)};
-    if (broken_joints) joints_.q.phi_rad = std::numeric_limits<double>::quiet_NaN();
+    if (broken_joints) joints_.q.phi_rad = NAN;
     ServoInput input{time_s_, {joints_.time_s, joints_.q, state, true, started}, std::nullopt, desired_, {}};
     if (steps_++ % image_every == 0) input.image = image();
     time_s_ += period_s_;
@@ -217,7 +216,6 @@ TEST(Servo, AMeasuredJointThatIsNotANumberLeavesEverythingFinite) {
   EXPECT_LT(world.steps(300).control.error.norm(), 0.01);
 }
 
-// Offsets that are off by a quarter turn: said, and nothing is moved.
 TEST(Servo, DoesNotMoveWherePsiIsMeasuredElsewhere) {
   for (const double by_rad : {1.5708, -1.5708, 3.1}) {
     MovedEndoscope world;
@@ -394,7 +392,6 @@ TEST(MovedEndoscope, IsNotOneImageThatIsOffOrLost) {
   EXPECT_EQ(world.steps(60).registration, 0);
 }
 
-// However it is read.
 TEST(MovedEndoscope, IsNoPictureThatRepeats) {
   MovedEndoscope world;
   world.aim(Eigen::Vector4d::Zero());

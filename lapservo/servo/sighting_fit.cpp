@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstddef>
 
 #include "lapservo/core/dense_matrix.h"
 #include "lapservo/geometry/rotation.h"
@@ -93,10 +92,6 @@ class Fit {
  private:
   Six errors(std::size_t i, const ArmNumbers& x, const Eigen::Vector2d& shift) const {
     const MarkerSighting& seen = data_.sightings[i];
-    return data_.whitening[i] * pose_difference(pose(seen, x, shift), seen.camera_from_marker);
-  }
-
-  Rigid3 pose(const MarkerSighting& seen, const ArmNumbers& x, const Eigen::Vector2d& shift) const {
     Eigen::Vector4d q = seen.q - x[arm::delay] * seen.q_rate;
     if (hypothesis_.mirrored) q[*hypothesis_.mirrored] *= -1;
     q += x.segment<4>(arm::offset);
@@ -106,9 +101,9 @@ class Fit {
                                       : static_cast<double>(seen.time_s > from_s);
     ArmNumbers now = x;
     now.segment<6>(arm::rotation) += part * x.segment<6>(arm::change);
-    const auto joints = JointVector::from_vector(q);
     const Rigid3 camera_from_rcm = moved_by(now, data_.camera_from_rcm);
-    return camera_from_marker(data_.marker, camera_from_rcm, joints);
+    const Rigid3 expected = camera_from_marker(data_.marker, camera_from_rcm, JointVector::from_vector(q));
+    return data_.whitening[i] * pose_difference(expected, seen.camera_from_marker);
   }
 
   const ArmData& data_;

@@ -51,7 +51,7 @@ void TipGoals::refuse_incomplete(const std::string& source, bool has_joints) con
 void TipGoals::use(const std::optional<Rigid3>& camera_from_rcm) {
   if (camera_from_rcm_ == camera_from_rcm && model_) return;
   camera_from_rcm_ = camera_from_rcm;
-  model_ = camera_from_rcm ? feature_model(rig_, *camera_from_rcm) : FeatureModel();
+  model_ = feature_model(rig_, camera_from_rcm);
 }
 
 void TipGoals::follow(const JointState& joints) {

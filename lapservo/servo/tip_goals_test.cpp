@@ -1,7 +1,6 @@
 #include "lapservo/servo/tip_goals.h"
 
 #include <cmath>
-#include <limits>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -156,7 +155,6 @@ TEST(TipGoals, TheImageClosesWhatTheRegistrationIsOffBy) {
   }
 }
 
-// The same place, while the wrist moves: the features move with it.
 TEST(TipGoals, FollowTheWrist) {
   const Rig rig = rig_with(placed_tool());
   const FeatureModel model = feature_model(rig);
@@ -277,8 +275,8 @@ TEST_F(Refusals, GoalsOutOfReachHaveTheNearestThatIsNot) {
     }
     EXPECT_EQ(nearer, 0);
   }
-  EXPECT_EQ(nearest_in(refused({{std::numeric_limits<double>::quiet_NaN(), 0, 0.1}})), std::nullopt);
-  EXPECT_NE(refused({{std::numeric_limits<double>::quiet_NaN(), 0, 0.1}}).find("not finite"), std::string::npos);
+  EXPECT_EQ(nearest_in(refused({{NAN, 0, 0.1}})), std::nullopt);
+  EXPECT_NE(refused({{NAN, 0, 0.1}}).find("not finite"), std::string::npos);
 }
 
 TEST_F(Refusals, SayWhatIsMissing) {

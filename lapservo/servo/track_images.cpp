@@ -1,9 +1,9 @@
 #include "lapservo/servo/track_images.h"
 
-#include <atomic>
 #include <chrono>
 #include <exception>
 #include <mutex>
+#include <stop_token>
 #include <thread>
 #include <utility>
 
@@ -80,11 +80,7 @@ class CallersTracking : public TrackedImageStream {
 class OwnThreadTracking : public TrackedImageStream {
  public:
   explicit OwnThreadTracking(std::unique_ptr<TrackedImageStream> tracking)
-      : tracking_(std::move(tracking)), thread_([this] { work(); }) {}
-  ~OwnThreadTracking() override {
-    stop_ = true;
-    thread_.join();
-  }
+      : tracking_(std::move(tracking)), thread_([this](const std::stop_token& stop) { work(stop); }) {}
 
   std::optional<TrackedImage> newest() override {
     const std::lock_guard lock(mutex_);
@@ -97,10 +93,10 @@ class OwnThreadTracking : public TrackedImageStream {
   }
 
  private:
-  void work() {
+  void work(const std::stop_token& stop) {
     constexpr std::chrono::microseconds between_looks(500);
     try {
-      while (!stop_) {
+      while (!stop.stop_requested()) {
         if (const auto wanted = take_wanted()) tracking_->use(*wanted);
         tracking_->set_delay(delay_s_);
         auto tracked = tracking_->newest();
@@ -130,8 +126,7 @@ class OwnThreadTracking : public TrackedImageStream {
   std::optional<TrackedImage> latest_;
   std::optional<ServoDecision> wanted_;
   std::exception_ptr failure_;
-  std::atomic<bool> stop_ = false;
-  std::thread thread_;  // last: it uses the others
+  std::jthread thread_;  // last: it uses the others
 };
 
 }  // namespace

@@ -8,6 +8,13 @@ namespace lapservo::internal {
 namespace {
 
 constexpr double step_px = 4;
+constexpr int band_rows = 16;
+
+// Columns `begin` to `end` (exclusive) of a band of rows; empty when they meet.
+struct Span {
+  int begin = 0, end = 0;
+  bool empty() const { return begin >= end; }
+};
 
 void widen(std::vector<Span>& bands, const Disc& disc, int width_px) {
   const double radius2 = disc.radius_px * disc.radius_px;
@@ -27,6 +34,22 @@ void widen(std::vector<Span>& bands, const Disc& disc, int width_px) {
   }
 }
 
+void widen_along(std::vector<Span>& bands, const Camera& camera, double half_field_rad, const Capsule& thing,
+                 double margin_px) {
+  const Eigen::Vector3d &from_m = thing.from_m, &to_m = thing.to_m;
+  const double length_m = (to_m - from_m).norm();
+  for (double along_m = 0;;) {
+    const Eigen::Vector3d point = length_m > 0 ? from_m + along_m / length_m * (to_m - from_m) : from_m;
+    Disc disc = disc_around_ball(camera, half_field_rad, point, thing.radius_m);
+    if (disc.radius_px > 0) {
+      disc.radius_px += margin_px + 1;
+      widen(bands, disc, camera.width_px);
+    }
+    if (!(along_m < length_m)) break;
+    along_m = std::min(along_m + std::max(1e-4, step_px * std::max(point.z(), 0.01) / camera.fx_px), length_m);
+  }
+}
+
 }  // namespace
 
 Disc disc_around_ball(const Camera& camera, double half_field_rad, const Eigen::Vector3d& centre, double radius_m) {
@@ -42,34 +65,16 @@ Disc disc_around_ball(const Camera& camera, double half_field_rad, const Eigen::
   return {raw, radius_m * per_m * stretch * stretch};
 }
 
-void widen_along(std::vector<Span>& bands, const Camera& camera, double half_field_rad, const Eigen::Vector3d& from_m,
-                 const Eigen::Vector3d& to_m, double radius_m, double margin_px) {
-  const double length_m = (to_m - from_m).norm();
-  for (double along_m = 0;;) {
-    const Eigen::Vector3d point = length_m > 0 ? from_m + along_m / length_m * (to_m - from_m) : from_m;
-    Disc disc = disc_around_ball(camera, half_field_rad, point, radius_m);
-    if (disc.radius_px > 0) {
-      disc.radius_px += margin_px + 1;
-      widen(bands, disc, camera.width_px);
-    }
-    if (!(along_m < length_m)) break;
-    along_m = std::min(along_m + std::max(1e-4, step_px * std::max(point.z(), 0.01) / camera.fx_px), length_m);
-  }
-}
-
-std::vector<Span> no_bands(const Camera& camera) {
-  return std::vector<Span>(static_cast<std::size_t>((camera.height_px + band_rows - 1) / band_rows));
-}
-
-std::vector<Span> outline(const Camera& camera, double half_field_rad, const ShaftModel& model,
-                          const ShaftPlacement& placement, double margin_px) {
-  std::vector<Span> bands = no_bands(camera);
-  const auto on_axis = [&](double along_m) -> Eigen::Vector3d {
-    return placement.camera_from_unrolled * Eigen::Vector3d(0, 0, along_m);
-  };
-  widen_along(bands, camera, half_field_rad, on_axis(-model.shaft_before_m),
-              on_axis(model.marker.length_m() + model.shaft_beyond_m), model.tip_radius_m(), margin_px);
-  return bands;
+std::vector<cv::Rect> outline(const Camera& camera, double half_field_rad, const std::vector<Capsule>& things,
+                              double margin_px) {
+  std::vector<Span> bands(static_cast<std::size_t>((camera.height_px + band_rows - 1) / band_rows));
+  for (const Capsule& thing : things) widen_along(bands, camera, half_field_rad, thing, margin_px);
+  std::vector<cv::Rect> parts;
+  for (int b = 0; b * band_rows < camera.height_px; ++b)
+    if (const Span& span = bands[static_cast<std::size_t>(b)]; !span.empty())
+      parts.emplace_back(span.begin, b * band_rows, span.end - span.begin,
+                         std::min(band_rows, camera.height_px - b * band_rows));
+  return parts;
 }
 
 }  // namespace lapservo::internal

@@ -104,30 +104,23 @@ class Renderer::State {
   std::vector<cv::Rect> draw(const std::vector<ShaftPlacement>& placements) {
     std::vector<cv::Rect> drawn;
     const double margin_px = optics_.reach_px() + 1;
-    const auto paint = [&](const std::vector<Span>& bands, auto& painter) {
-      for (std::size_t b = 0; b < bands.size(); ++b) {
-        if (bands[b].empty()) continue;
-        const int top = static_cast<int>(b) * band_rows;
-        const cv::Rect part(bands[b].begin, top, bands[b].end - bands[b].begin,
-                            std::min(band_rows, camera_.height_px - top));
+    const auto paint = [&](const std::vector<Capsule>& things, auto painter) {
+      for (const cv::Rect& part : outline(camera_, half_field_rad_, things, margin_px)) {
         painter.paint(rays_, part, background_light_, scene_);
         drawn.push_back(part);
       }
     };
     for (std::size_t i = 0; i < placements.size(); ++i) {
       const ShaftModel& shaft = shafts_.at(i);
-      const Eigen::Vector3d tip =
-          placements[i].camera_from_unrolled * Eigen::Vector3d(0, 0, shaft.marker.length_m() + shaft.shaft_beyond_m);
-      ShaftPainter painter(shaft, placements[i], options_.lighting,
-                           disc_around_ball(camera_, half_field_rad_, tip, shaft.tip_radius_m()));
-      paint(outline(camera_, half_field_rad_, shaft, placements[i], margin_px), painter);
+      const auto on_axis = [&](double along_m) -> Eigen::Vector3d {
+        return placements[i].camera_from_unrolled * Eigen::Vector3d(0, 0, along_m);
+      };
+      const Capsule whole{on_axis(-shaft.shaft_before_m), on_axis(shaft.marker.length_m() + shaft.shaft_beyond_m),
+                          shaft.tip_radius_m()};
+      const Disc tip = disc_around_ball(camera_, half_field_rad_, whole.to_m, whole.radius_m);
+      paint({whole}, ShaftPainter(shaft, placements[i], options_.lighting, tip));
       const std::vector<Capsule> links = tool_links(shaft, placements[i]);
-      if (links.empty()) continue;
-      std::vector<Span> bands = no_bands(camera_);
-      for (const Capsule& link : links)
-        widen_along(bands, camera_, half_field_rad_, link.from_m, link.to_m, link.radius_m, margin_px);
-      ToolPainter tool(links, options_.lighting);
-      paint(bands, tool);
+      paint(links, ToolPainter(links, options_.lighting));
     }
     return without_overlap(std::move(drawn));
   }

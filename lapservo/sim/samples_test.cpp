@@ -58,36 +58,14 @@ std::vector<Pair> pairs(const fs::path& folder) {
   return found;
 }
 
-class Samples : public ::testing::Test {
- protected:
-  void SetUp() override {
-    const auto folder = testing::sample_frames("illumination");
-    if (!folder) GTEST_SKIP() << "no sample frames";
-    pairs_ = pairs(*folder);
-    ASSERT_GE(pairs_.size(), 3U);
-  }
-  std::vector<Pair> pairs_;
-};
-
-TEST_F(Samples, BoundariesLieWhereRayTracedOnesDo) {
-  double squares = 0, count = 0;
-  for (const Pair& pair : pairs_) {
-    for (const Eigen::Vector2d& edge : pair.edges_px) {
-      const auto in_sample = crossing_px(pair.sample, edge, pair.direction);
-      const auto in_rendered = crossing_px(pair.rendered, edge, pair.direction);
-      ASSERT_TRUE(in_sample && in_rendered);
-      EXPECT_NEAR(*in_rendered, *in_sample, 0.12);
-      squares += std::pow(*in_rendered - *in_sample, 2);
-      ++count;
-    }
-  }
-  EXPECT_LE(std::sqrt(squares / count), 0.04);
-}
-
 // The middle of each band, at the centre line and 30 px beside it.
-TEST_F(Samples, LightAndNoiseAreAlike) {
+TEST(Samples, LightAndNoiseAreAlike) {
+  const auto folder = testing::sample_frames("illumination");
+  if (!folder) GTEST_SKIP() << "no sample frames";
+  const std::vector<Pair> all = pairs(*folder);
+  ASSERT_GE(all.size(), 3U);
   double sample_noise = 0, rendered_noise = 0;
-  for (const Pair& pair : pairs_) {
+  for (const Pair& pair : all) {
     const Eigen::Vector2d across(-pair.direction.y(), pair.direction.x());
     for (std::size_t k = 0; k < 3; ++k)
       for (const double side_px : {-30, 0, 30}) {
@@ -104,34 +82,6 @@ TEST_F(Samples, LightAndNoiseAreAlike) {
       }
   }
   EXPECT_NEAR(std::sqrt(rendered_noise / sample_noise), 1, 0.15);
-}
-
-// The rise of light from 20 to 80 % over e1.
-TEST_F(Samples, BlurIsAlike) {
-  const auto rise_px = [](const cv::Mat& light, const Pair& pair) {
-    std::vector<double> at;
-    const Eigen::Vector2d across(-pair.direction.y(), pair.direction.x());
-    const auto red = [&](double t) {
-      double sum = 0;
-      for (double side = -3; side <= 3; side += 0.5)
-        sum += light_at(light, pair.edges_px[1] + t * pair.direction + side * across)[2];
-      return sum;
-    };
-    const double low = red(4), high = red(-4);
-    for (const double level : {0.8, 0.2})
-      for (double t = -4; t < 4; t += 0.02)
-        if ((red(t) - low) / (high - low) < level) {
-          at.push_back(t);
-          break;
-        }
-    return at.at(1) - at.at(0);
-  };
-  double sample = 0, rendered = 0;
-  for (const Pair& pair : pairs_) {
-    sample += rise_px(pair.sample, pair);
-    rendered += rise_px(pair.rendered, pair);
-  }
-  EXPECT_NEAR(rendered / sample, 1, 0.1);
 }
 
 }  // namespace

@@ -59,17 +59,6 @@ TEST(Sensor, NoiseIsIndependentOfItsNeighboursAndOfTheFrameBefore) {
   EXPECT_LT(std::abs(a.rowRange(1, 150).dot(a.rowRange(0, 149))) / power, limit);
 }
 
-TEST(Sensor, GainsScaleTheLightBeforeItClips) {
-  const Response linear{Response::Kind::power, 1};
-  Sensor sensor;
-  sensor.read_noise = sensor.shot_noise = 0;
-  sensor.gains = Light(0.5F, 1, 2);
-  const cv::Vec3b pixel = exposed(linear, sensor, 0.6F, 1).at<cv::Vec3b>(10, 10);
-  EXPECT_NEAR(pixel[0], 0.3 * 255, 1);
-  EXPECT_NEAR(pixel[1], 0.6 * 255, 1);
-  EXPECT_EQ(pixel[2], 255);
-}
-
 // The second moment of a blurred step's slope is the blur's variance.
 TEST(Optics, BlurHasTheWidthThatWasAskedFor) {
   for (const double blur_px : {0.8, 2.2, 5.0})
@@ -91,20 +80,6 @@ TEST(Optics, BlurHasTheWidthThatWasAskedFor) {
       EXPECT_NEAR(mean, 39.5, 1e-3);
       EXPECT_NEAR(std::sqrt(square - mean * mean), blur_px, 0.03 * blur_px);
     }
-}
-
-TEST(Optics, APartIsBlurredAsInTheWhole) {
-  cv::Mat light(40, 50, CV_32FC3);
-  cv::randu(light, cv::Scalar::all(0), cv::Scalar::all(1));
-  Optics optics(1.4);
-  for (const int v : {0, 3, 20, 39}) {
-    const float* whole = optics.row(light, v, 0, 50);
-    const std::vector<float> row(whole, whole + 150);
-    for (const int begin : {0, 2, 17, 44}) {
-      const float* part = optics.row(light, v, begin, begin + 6);
-      for (int i = 0; i < 18; ++i) EXPECT_FLOAT_EQ(part[i], row[static_cast<std::size_t>(3 * begin + i)]);
-    }
-  }
 }
 
 }  // namespace

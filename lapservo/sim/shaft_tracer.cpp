@@ -48,12 +48,10 @@ ShaftTracer::ShaftTracer(const ShaftModel& model, const ShaftPlacement& placemen
   shaft_end_m_ = static_cast<float>(marker.length_m() + model.shaft_beyond_m);
   tau_facing_ = static_cast<float>(wrap_two_pi(marker_azimuth_rad(marker, facing_rad, placement.psi_rad)));
   const auto at_seam = boundaries_m(marker, 0), slopes = boundary_slopes_m(marker);
-  e1_m_ = static_cast<float>(at_seam[1]);
-  e2_m_ = static_cast<float>(at_seam[2]);
-  e1_slope_m_ = static_cast<float>(slopes[1]);
-  e2_slope_m_ = static_cast<float>(slopes[2]);
-  e0_slope_m_ = static_cast<float>(slopes[0]);
-  e3_slope_m_ = static_cast<float>(slopes[3]);
+  for (std::size_t i = 0; i < 4; ++i) {
+    at_seam_m_[i] = static_cast<float>(at_seam[i]);
+    slope_m_[i] = static_cast<float>(slopes[i]);
+  }
   covered_rad_ = static_cast<float>(marker.covered_rad());
   for (Blotch& blotch : blotches_) blotch.azimuth_rad = wrap_two_pi(blotch.azimuth_rad);
   square_ = marker.gap_rad == 0 && slopes[0] == 0 && slopes[3] == 0;
@@ -88,8 +86,10 @@ void ShaftTracer::trace_askew(RayRow& rays) const {
       at.azimuth_rad = std::atan2(at.depth_m * d.y(), cx + at.depth_m * d.x());
       const float tau = tau_rad(at.azimuth_rad);
       const bool covered =
-          tau < covered_rad_ && at.along_m >= e0_slope_m_ * tau && at.along_m <= length_m_ + e3_slope_m_ * tau;
-      if (covered) at.band = 1 + (at.along_m > e1_m_ + e1_slope_m_ * tau) + (at.along_m > e2_m_ + e2_slope_m_ * tau);
+          tau < covered_rad_ && at.along_m >= slope_m_[0] * tau && at.along_m <= length_m_ + slope_m_[3] * tau;
+      if (covered)
+        at.band =
+            1 + (at.along_m > at_seam_m_[1] + slope_m_[1] * tau) + (at.along_m > at_seam_m_[2] + slope_m_[2] * tau);
       return at;
     };
     const Hit outer = hit(outer_m_, -1);
@@ -124,7 +124,7 @@ void ShaftTracer::trace_square(RayRow& rays) const {
   const float m00 = m(0, 0), m01 = m(0, 1), m02 = m(0, 2), m10 = m(1, 0), m11 = m(1, 1), m12 = m(1, 2), m20 = m(2, 0),
               m21 = m(2, 1), m22 = m(2, 2);
   const float length = length_m_, start = shaft_start_m_, end = shaft_end_m_, tau_facing = tau_facing_;
-  const float e1 = e1_m_, e2 = e2_m_, e1_slope = e1_slope_m_, e2_slope = e2_slope_m_;
+  const float e1 = at_seam_m_[1], e2 = at_seam_m_[2], e1_slope = slope_m_[1], e2_slope = slope_m_[2];
   const float per_outer = 1 / outer_m_, per_inner = 1 / inner_m_;
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC ivdep  // the columns never overlap
@@ -224,7 +224,7 @@ float ShaftTracer::tau_rad(float azimuth_rad) const {
 
 float ShaftTracer::beyond_boundary_m(std::size_t index, float azimuth_rad, float along_m) const {
   const float tau = tau_rad(azimuth_rad);
-  return along_m - (index == 1 ? e1_m_ + e1_slope_m_ * tau : e2_m_ + e2_slope_m_ * tau);
+  return along_m - (at_seam_m_[index] + slope_m_[index] * tau);
 }
 
 Eigen::Vector3f ShaftTracer::in_facing_frame(const Eigen::Vector3d& point_in_camera) const {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -73,10 +74,8 @@ class ShaftTracer {
   Eigen::Vector3f camera_;
   float outer_m_, inner_m_, tip_m_;
   float length_m_, shaft_start_m_, shaft_end_m_;
-  float tau_facing_;               // tau on the facing generatrix, in [0, 2 pi)
-  float e1_m_, e2_m_;              // at tau = 0
-  float e1_slope_m_, e2_slope_m_;  // per radian
-  float e0_slope_m_, e3_slope_m_;
+  float tau_facing_;                          // tau on the facing generatrix, in [0, 2 pi)
+  std::array<float, 4> at_seam_m_, slope_m_;  // of boundaries e0 to e3: at tau = 0, and per radian
   float covered_rad_;
   bool square_;  // both ends are circles, and the print reaches round
   std::vector<Blotch> blotches_;

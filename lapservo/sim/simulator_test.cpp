@@ -209,7 +209,6 @@ TEST(Simulator, RefusesNonsense) {
   EXPECT_THROW(Simulator(rig, {}, {0, 1.5, 0.1, 0}), InputError);
 }
 
-// Shown and read as it is.
 TEST(Simulator, TheFirstJointOfAWristSwings) {
   Rig rig = small_rig();
   Tool& tool = rig.instruments[0].tool.emplace();

@@ -6,16 +6,11 @@
 #include <Eigen/Core>
 #include <opencv2/core.hpp>
 
+#include "lapservo/sim/outline.h"
 #include "lapservo/sim/scene.h"
 #include "lapservo/sim/shaft_painter.h"
 
 namespace lapservo::internal {
-
-/// A thing within a radius of a straight line between two points of the camera's frame.
-struct Capsule {
-  Eigen::Vector3d from_m, to_m;
-  double radius_m = 0;
-};
 
 /// The tool's links in the camera's frame, from the shaft's end to the tip, where they end; of a wrist the last two are
 /// the fingers of a closed jaw. None without a tool in its place. Throws as tip_in_marker does.

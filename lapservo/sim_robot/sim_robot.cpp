@@ -9,7 +9,7 @@
 #include "lapservo/crtk/crtk_robot.h"
 #include "lapservo/crtk/image_decoder.h"
 #include "lapservo/crtk/joint_map.h"
-#include "lapservo/io/pictures/jpeg_encoding.h"
+#include "lapservo/io/pictures/jpeg_picture.h"
 #include "lapservo/sim/simulated_wrist.h"
 #include "lapservo/tool/wrist.h"
 

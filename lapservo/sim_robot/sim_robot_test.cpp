@@ -14,8 +14,7 @@ namespace {
 // Both sides of the topics in memory, on one time that passes as the test says.
 class Room {
  public:
-  explicit Room(const Rig& scene = testing::small_test_rig(), double wrist_swing_rad = 0)
-      : rig(scene), simulator(rig, simulated(wrist_swing_rad), {0.05, 1.57, 0.064, 1.2}) {
+  Room() : rig(testing::small_test_rig()), simulator(rig, simulated(), {0.05, 1.57, 0.064, 1.2}) {
     rig.instruments[0].joints = default_joints();
     interlock.emplace(interlock_of(rig.instruments[0], {}, true, 1));
     robot.emplace(transport, rig, simulator, SimRobotConfig{});
@@ -29,9 +28,8 @@ class Room {
     subscriptions.push_back(transport.subscribe<ImageMessage>(
         "/endoscope/image_raw", [this](ImageMessage&& message) { images.receive(std::move(message), now_s); }));
   }
-  static SimulatorConfig simulated(double wrist_swing_rad) {
+  static SimulatorConfig simulated() {
     SimulatorConfig config;
-    config.wrist_swing_rad = wrist_swing_rad;
     config.endoscope.frame_rate_hz = 30;
     return config;
   }
@@ -78,21 +76,6 @@ TEST(SimRobot, IsMovedThroughItsTopicsAndShowsItself) {
   EXPECT_EQ(statistics.wrist_moved, 0);
   EXPECT_EQ(statistics.malformed, 0);
   EXPECT_TRUE((statistics.max_step.array() <= JointLimits().rate.array() * 0.002 + 1e-9).all());
-}
-
-TEST(SimRobot, SaysTheToolsWristThatMovesByItself) {
-  Rig rig = testing::small_test_rig();
-  rig.instruments[0].tool.emplace().wrist = {{.name = "wrist_pitch"}, {.name = "wrist_yaw"}, {.name = "finger"}};
-  Room room(rig, 0.5);
-  room.pass(0.01, Eigen::Vector4d::Zero());
-  const std::vector<double> first = room.interlock->state(room.now_s).wrist_rad;
-  room.pass(2, {0.05, 0, 0, 0});
-  const std::vector<double> then = room.interlock->state(room.now_s).wrist_rad;
-  ASSERT_EQ(first.size(), 3u);
-  EXPECT_NEAR(then[0] - first[0], 0.5, 1e-3);
-  EXPECT_EQ(then[1], first[1]);
-  EXPECT_EQ(room.robot->statistics().wrist_moved, 0);
-  EXPECT_EQ(room.robot->statistics().malformed, 0);
 }
 
 TEST(SimRobot, OffersItsImagesCompressedToThoseWhoReadThem) {

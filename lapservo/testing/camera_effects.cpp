@@ -10,7 +10,7 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/core/random.h"
 #include "lapservo/io/image_file.h"
-#include "lapservo/io/pictures/jpeg_encoding.h"
+#include "lapservo/io/pictures/jpeg_picture.h"
 
 namespace lapservo::effects {
 using namespace internal;

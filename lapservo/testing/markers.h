@@ -9,11 +9,7 @@ namespace lapservo::testing {
 using namespace internal;
 
 inline Marker marker_with(const std::array<double, 3>& upper_m, const std::array<double, 3>& lower_m) {
-  Marker marker;
-  marker.diameter_m = 0.0084;
-  marker.bands_upper_m = upper_m;
-  marker.bands_lower_m = lower_m;
-  return marker;
+  return {.diameter_m = 0.0084, .bands_upper_m = upper_m, .bands_lower_m = lower_m};
 }
 
 /// l1 : l2 constant: both inner boundaries, extended, meet on the proximal end.

@@ -49,10 +49,7 @@ bool wholly_in_view(const Rig& rig, const Marker& marker, const Rigid3& pose, do
 }  // namespace
 
 Rig usual_rig(std::size_t instruments) {
-  Rig rig;
-  rig.camera.width_px = 960, rig.camera.height_px = 540;
-  rig.camera.fx_px = rig.camera.fy_px = 825;
-  rig.camera.cx_px = 474.3, rig.camera.cy_px = 272.8;
+  Rig rig{{960, 540, 825, 825, 474.3, 272.8, {}, {}}, {}};
   for (std::size_t i = 0; i < instruments; ++i) {
     const Port& port = ports.at(i);
     const Marker marker{0.0084, port.hues_deg, {0.0035, 0.0035, 0.017}, {0.0095, 0.0095, 0.005}, 0.4};
@@ -216,20 +213,6 @@ BloodyMotion::BloodyMotion(const Rig& rig, double fraction, std::uint64_t seed, 
     q.back().theta_rad += 1e-3 * i, q.back().psi_rad += 2e-3 * i;
     frames.push_back(renderer.render({placement_of(rig.instruments[0], q.back())}, seed));
   }
-}
-
-cv::Mat render_aberrated(const Rig& rig, const JointVector& q, std::uint64_t seed,
-                         const ChromaticAberration& aberration) {
-  std::array<cv::Mat, 3> channels;
-  for (const auto& [c, magnification] :
-       {std::pair(0U, aberration.blue), std::pair(1U, 1.0), std::pair(2U, aberration.red)}) {
-    Rig magnified = rig;
-    magnified.camera.fx_px *= magnification, magnified.camera.fy_px *= magnification;
-    cv::extractChannel(render(magnified, {q}, seed, {}), channels[c], static_cast<int>(c));
-  }
-  cv::Mat picture;
-  cv::merge(channels.data(), channels.size(), picture);
-  return picture;
 }
 
 cv::Mat render_nothing(const Rig& rig, std::uint64_t seed) {

@@ -107,11 +107,6 @@ struct Shot {
   double psi_error_rad(const PoseUnknowns& unknowns) const;  ///< of psi by the registration
 };
 
-/// An image of the first instrument by a lens with lateral chromatic aberration: each channel has a camera with another
-/// focal length.
-cv::Mat render_aberrated(const Rig& rig, const JointVector& q, std::uint64_t seed,
-                         const ChromaticAberration& aberration);
-
 /// The shot of a seed, rendered once for all who ask.
 const Shot& usual_shot(std::uint64_t seed);
 

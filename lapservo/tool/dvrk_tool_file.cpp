@@ -88,10 +88,9 @@ std::vector<WristJoint> parse_wrist(const YamlField& list) {
   if (roll.alpha_rad != 0 || roll.a_m != 0) fields.front().fail("not about the shaft", expected);
   std::vector<WristJoint> wrist;
   for (auto field = fields.begin() + 1; field != fields.end(); ++field) {
-    wrist.push_back(parse_joint(*field));
-    const auto has_its_name = [&](const WristJoint& other) { return other.name == wrist.back().name; };
-    if (std::find_if(wrist.begin(), wrist.end(), has_its_name) != wrist.end() - 1)
-      (*field)["name"].fail(wrist.back().name, "a name that no other joint has");
+    const std::string name = wrist.emplace_back(parse_joint(*field)).name;
+    if (std::ranges::count(wrist, name, &WristJoint::name) > 1)
+      (*field)["name"].fail(name, "a name that no other joint has");
   }
   return wrist;
 }

@@ -2,7 +2,6 @@
 
 #include <array>
 #include <cmath>
-#include <cstddef>
 
 #include <Eigen/Geometry>
 #include <fmt/format.h>

@@ -28,11 +28,7 @@ bool all_finite(const Observation& o) {
   for (std::size_t k = 0; k < 4; ++k)
     finite = finite && o.edges_ideal_px[k].allFinite() && o.edges_raw_px[k].allFinite();
   if (o.rcm) finite = finite && o.rcm->q.vector().allFinite() && o.rcm->covariance.allFinite();
-  if (o.status == Status::ok)
-    finite = finite && o.edges_covariance_px2.allFinite() && std::isfinite(o.features.s_rad) &&
-             std::isfinite(o.features.r_px.value_or(0)) && std::isfinite(o.features.l_px) &&
-             std::isfinite(o.features.d_px) && std::isfinite(o.features.cross_ratio);
-  return finite;
+  return finite && (o.status != Status::ok || o.edges_covariance_px2.allFinite());
 }
 
 // Pose, centre line, edges, features and tau agree.

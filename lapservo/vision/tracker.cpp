@@ -6,6 +6,7 @@
 #include "lapservo/core/words.h"
 #include "lapservo/rig/check_rig.h"
 #include "lapservo/tool/wrist.h"
+#include "lapservo/vision/decision/fit_observation.h"
 #include "lapservo/vision/image/image_view.h"
 #include "lapservo/vision/image/interlacing.h"
 #include "lapservo/vision/paper/centerline.h"
@@ -44,14 +45,11 @@ TrackerOptions checked(TrackerOptions options) {
 
 Observation refused_as_interlaced(const Observation& observation, Method method) {
   using What = Observation::Refused::What;
-  Observation refused;
-  refused.status = Status::interlaced;
+  Observation refused = refused_observation(Status::interlaced);
   refused.refused = observation.refused;
-  if (observation.status != Status::ok) return refused;
-  refused.refused.what = method == Method::surface ? What::pose : What::edges;
-  refused.refused.camera_from_unrolled = observation.camera_from_unrolled;
-  refused.refused.psi_rad = observation.psi_rad;
-  refused.refused.edges_raw_px = observation.edges_raw_px;
+  if (observation.status == Status::ok)
+    refused.refused = {method == Method::surface ? What::pose : What::edges, observation.camera_from_unrolled,
+                       observation.psi_rad, observation.edges_raw_px};
   return refused;
 }
 
@@ -72,7 +70,7 @@ struct Tracker::State {
         deinterlace(options.deinterlace || rig.camera.deinterlace),
         even_field(rig.camera.response),
         wrists(rig.instruments.size()),
-        surface(rig, options.single, options.frame_budget, options.max_p_false),
+        surface(rig, options),
         centerline(rig) {}
 
   void observe(const cv::Mat& image_bgr, std::optional<double> time_s) {
@@ -81,12 +79,12 @@ struct Tracker::State {
     else
       observations = centerline.observe(image_bgr);
   }
-  void name_observations() {
-    for (std::size_t i = 0; i < observations.size(); ++i) observations[i].instrument = rig.instruments[i].name;
-  }
-  void add_tips() {
-    for (std::size_t i = 0; i < observations.size(); ++i)
+  const std::vector<Observation>& with_names_and_tips() {
+    for (std::size_t i = 0; i < observations.size(); ++i) {
+      observations[i].instrument = rig.instruments[i].name;
       if (const auto& tool = rig.instruments[i].tool) observations[i].tip = tip_of(observations[i], *tool, wrists[i]);
+    }
+    return observations;
   }
   // A frame between two moments is no observation of either, and nothing to start the next frame from.
   void refuse_combed(const cv::Mat& image_bgr) {
@@ -118,13 +116,11 @@ const std::vector<Observation>& Tracker::track(const cv::Mat& image_bgr, std::op
   check_image(image_bgr, state_->rig.camera);
   state_->observe(state_->deinterlace ? state_->even_field.of(image_bgr) : image_bgr, time_s);
   if (!state_->deinterlace) state_->refuse_combed(image_bgr);
-  state_->name_observations();
-  state_->add_tips();
-  return state_->observations;
+  return state_->with_names_and_tips();
 }
 
 std::vector<Observation> Tracker::track(const cv::Mat& image_bgr) && {
-  state_->surface.set_frame_budget(std::nullopt);
+  state_->surface.search_frames_whole();
   return track(image_bgr);  // the overload above: *this is an lvalue here
 }
 
@@ -137,7 +133,6 @@ void Tracker::set_registration(std::size_t instrument, const Rigid3& camera_from
   moved.camera_from_rcm = camera_from_rcm;
   moved.registration_covariance = covariance;
   state_->surface.set_registration(instrument, moved);
-  state_->centerline.set_registration(instrument, moved);
 }
 
 void Tracker::set_wrist(std::size_t instrument, std::span<const double> wrist_rad) {
@@ -148,11 +143,8 @@ void Tracker::set_wrist(std::size_t instrument, std::span<const double> wrist_ra
 
 const std::vector<Observation>& Tracker::refuse(Status why) & {
   for (std::size_t i = 0; i < state_->rig.instruments.size(); ++i) state_->surface.forget(i);
-  Observation refused;
-  refused.status = why;
-  state_->observations.assign(state_->rig.instruments.size(), refused);
-  state_->name_observations();
-  return state_->observations;
+  state_->observations.assign(state_->rig.instruments.size(), refused_observation(why));
+  return state_->with_names_and_tips();
 }
 
 void Tracker::reset() {

@@ -28,14 +28,6 @@ TEST(Tracker, OneThatIsATemporaryGivesItsObservationsAway) {
   EXPECT_EQ(seen, 1);
 }
 
-// Another than a temporary lends them: no copy a frame.
-TEST(Tracker, LendsTheSameObservationsFrameByFrame) {
-  const auto& shot = usual_shot(1);
-  Tracker tracker(shot.rig);
-  const Observation* const first = tracker.track(shot.bgr).data();
-  EXPECT_EQ(tracker.track(shot.bgr).data(), first);
-}
-
 TEST(Tracker, NamesTheInstrumentWhateverBecomesOfIt) {
   const auto& shot = usual_shot(1);
   Tracker tracker(shot.rig);

@@ -7,12 +7,12 @@
 #include <fmt/format.h>
 
 #include "lapservo/calibration/camera/camera_measurement.h"
-#include "lapservo/calibration/colour/colour_measurement.h"
+#include "lapservo/calibration/colour/colour_calibration.h"
 #include "lapservo/calibration/marker/marker_measurement.h"
 #include "lapservo/calibration/registration/registration_measurement.h"
 #include "lapservo/core/atomic_file.h"
 #include "lapservo/core/error.h"
-#include "lapservo/rig/instrument_index.h"
+#include "lapservo/rig/instruments.h"
 #include "lapservo/rig/rig_writer.h"
 #include "python/src/bindings.h"
 #include "python/src/conversions.h"
@@ -39,17 +39,6 @@ GivenRig rig_of(const py::object& given) {
   return {load_rig(path), path};
 }
 
-std::size_t index_of(const GivenRig& given, const std::optional<std::string>& name) {
-  if (!name) {
-    if (given.rig.instruments.size() > 1)
-      throw InputError(given.name(), "has several instruments: name one with instrument");
-    return 0;
-  }
-  const auto index = instrument_index(given.rig, *name);
-  if (!index) throw InputError("instrument", "name", *name, "an instrument of " + given.name());
-  return *index;
-}
-
 // Ctrl-C ends it as an exception of Python's.
 JobWatch watch_of(const py::object& progress) {
   JobWatch watch;
@@ -66,16 +55,17 @@ void expect_result(const std::string& refusal, const std::string& source) {
   if (!refusal.empty()) throw InputError(source, refusal);
 }
 
-// The fields of every result: without a rig, `camera` is the measured one.
-py::dict result_of(std::optional<GivenRig> measured, const Camera& camera, const std::vector<CalibratedNumber>& numbers,
-                   const std::string& complaint) {
+// The fields of every result and its own: without a rig, `camera` is the measured one.
+template <typename Calibration, typename... Own>
+py::dict result_of(const std::optional<GivenRig>& measured, const Camera& camera,
+                   const std::vector<CalibratedNumber>& numbers, const std::string& complaint,
+                   const Calibration& calibration, Own&&... own) {
   py::list rows;
   for (const CalibratedNumber& n : numbers) rows.append(py::make_tuple(n.name, n.before, n.after, n.sigma));
-  py::dict result("yaml"_a = measured ? measured_rig_yaml(measured->rig, measured->path) : camera_yaml(camera),
-                  "numbers"_a = rows, "complaint"_a = complaint, "faults"_a = py::list(), "rig"_a = py::none());
-  if (!measured) return result;
-  result["rig"] = py::cast(with_absolute_files(std::move(measured->rig)));
-  return result;
+  return py::dict("yaml"_a = measured ? measured_rig_yaml(measured->rig, measured->path) : camera_yaml(camera),
+                  "numbers"_a = rows, "complaint"_a = complaint, "faults"_a = calibration.faults,
+                  "rig"_a = measured ? std::optional(with_absolute_files(measured->rig)) : std::nullopt,
+                  std::forward<Own>(own)...);
 }
 
 py::dict calibrate_camera(const py::list& pictures, const std::string& corners, double square_m, const py::object& rig,
@@ -112,26 +102,21 @@ py::dict calibrate_camera(const py::list& pictures, const std::string& corners, 
   expect_result(calibration.refusal, name);
   const Camera camera = measured_camera(calibration);
   if (given) given->rig.camera = camera, given->rig.camera_file.clear();
-  py::dict result = result_of(given, camera, calibrated_numbers(before, calibration), complaint);
   py::list views;
   for (std::size_t i = 0; i < measured.views.size(); ++i)
     views.append(py::make_tuple(measured.views[i].name, measured.views[i].corners.size(), calibration.view_rms_px[i]));
-  result["camera"] = camera;
-  result["rms_px"] = calibration.rms_px;
-  result["noise"] = calibration.noise;
-  result["faults"] = calibration.faults;
-  result["views"] = views;
-  result["without_board"] = without_board;
-  result["advice"] = measured.advice;
-  result["sigma_response"] = calibration.response ? py::cast(calibration.response->sigma) : py::none();
-  result["sharpening"] = calibration.response ? calibration.response->sharpening : 0.0;
-  return result;
+  const auto& response = calibration.response;
+  return result_of(given, camera, calibrated_numbers(before, calibration), complaint, calibration, "camera"_a = camera,
+                   "rms_px"_a = calibration.rms_px, "noise"_a = calibration.noise, "views"_a = views,
+                   "without_board"_a = without_board, "advice"_a = measured.advice,
+                   "sigma_response"_a = response ? std::optional(response->sigma) : std::nullopt,
+                   "sharpening"_a = response ? response->sharpening : 0.0);
 }
 
 py::dict calibrate_colour(const py::object& frames, const py::object& rig, const std::optional<std::string>& instrument,
                           bool replace_response, bool deinterlace, double fps, const py::object& progress) {
   const GivenRig given = rig_of(rig);
-  const std::size_t index = index_of(given, instrument);
+  const std::size_t index = named_instrument(given.rig, instrument, given.name(), "instrument");
   const GivenFrames source(frames, fps, &given.rig.camera, deinterlace);
   const JobWatch watch = watch_of(progress);
   const ColourMeasurement measured = unlocked([&] {
@@ -140,27 +125,16 @@ py::dict calibrate_colour(const py::object& frames, const py::object& rig, const
   const ColourCalibration& calibration = measured.calibration;
   expect_result(calibration.refusal, source.name);
   const Instrument& before = given.rig.instruments[index];
-  py::dict result = result_of(GivenRig{with_colour(given.rig, index, calibration), given.path}, {},
-                              calibrated_numbers(before.marker, calibration), measured.read.complaint);
-  result["instrument"] = before.name;
-  result["hues_deg"] = calibration.hues_deg;
-  result["sigma_hues_deg"] = calibration.sigma_hues_deg;
-  result["response"] = calibration.response_found;
-  result["faults"] = calibration.faults;
-  result["found_before"] = calibration.found_before;
-  result["found"] = calibration.found;
-  result["frames"] = measured.frames;
-  return result;
+  return result_of(GivenRig{with_colour(given.rig, index, calibration), given.path}, {},
+                   calibrated_numbers(before.marker, calibration), measured.read.complaint, calibration,
+                   "instrument"_a = before.name, "hues_deg"_a = calibration.hues_deg,
+                   "sigma_hues_deg"_a = calibration.sigma_hues_deg, "response"_a = calibration.response_found,
+                   "found_before"_a = calibration.found_before, "found"_a = calibration.found,
+                   "frames"_a = measured.frames);
 }
 
-struct GivenJoints {
-  Joints joints;
-  JointRecording recording;
-  std::string source;
-};
-
 // A CSV's path, or columns by name: through the same table, by as many digits as reads back to the last bit.
-std::optional<GivenJoints> joints_of(const py::object& given, const Instrument& instrument, const std::string& rig) {
+std::optional<JointInput> joints_of(const py::object& given, const Instrument& instrument, const std::string& rig) {
   if (given.is_none()) return std::nullopt;
   std::string source = "joints";
   CsvTable table = [&] {
@@ -186,14 +160,14 @@ std::optional<GivenJoints> joints_of(const py::object& given, const Instrument& 
   std::vector<std::string> names = table.columns();
   std::erase(names, "time_s");
   const Joints joints = internal::joints_of(instrument, names, source, rig);
-  return GivenJoints{joints, joint_recording_of(table, source, joints), source};
+  return JointInput{joints, joint_recording_of(table, source, joints), source};
 }
 
 py::dict calibrate_marker(const py::object& frames, const py::object& rig, const py::object& joints,
                           const std::optional<std::string>& instrument, bool deinterlace, double fps,
                           const py::object& progress) {
   const GivenRig given = rig_of(rig);
-  const std::size_t index = index_of(given, instrument);
+  const std::size_t index = named_instrument(given.rig, instrument, given.name(), "instrument");
   const Instrument& before = given.rig.instruments[index];
   if (!joints.is_none()) expect_registration(before, given.name(), "joints");
   std::optional<JointsOfTurn> turn;
@@ -207,18 +181,11 @@ py::dict calibrate_marker(const py::object& frames, const py::object& rig, const
   expect_result(calibration.refusal, source.name);
   GivenRig after = given;
   after.rig.instruments[index].marker = calibration.marker;
-  py::dict result = result_of(after, {}, calibrated_numbers(before.marker, calibration.marker, turn.has_value()),
-                              measured.read.complaint);
-  result["instrument"] = before.name;
-  result["looked_at"] = measured.read.looked_at;
-  result["found"] = measured.found;
-  result["frames"] = calibration.frames;
-  result["seam_views"] = calibration.seam_views;
-  result["before_px"] = calibration.before_px;
-  result["after_px"] = calibration.after_px;
-  result["faults"] = calibration.faults;
-  result["seam_may_lag"] = calibration.seam_may_lag;
-  return result;
+  return result_of(after, {}, calibrated_numbers(before.marker, calibration.marker, turn.has_value()),
+                   measured.read.complaint, calibration, "instrument"_a = before.name,
+                   "looked_at"_a = measured.read.looked_at, "found"_a = measured.found, "frames"_a = calibration.frames,
+                   "seam_views"_a = calibration.seam_views, "before_px"_a = calibration.before_px,
+                   "after_px"_a = calibration.after_px, "seam_may_lag"_a = calibration.seam_may_lag);
 }
 
 Eigen::Matrix<double, Eigen::Dynamic, 4> residuals_of(const Registration& registration) {
@@ -234,7 +201,7 @@ py::dict calibrate_registration(const py::object& frames, const py::object& rig,
                                 const std::optional<std::string>& instrument_name, bool deinterlace, double fps,
                                 const py::object& progress) {
   const GivenRig given = rig_of(rig);
-  const std::size_t index = index_of(given, instrument_name);
+  const std::size_t index = named_instrument(given.rig, instrument_name, given.name(), "instrument");
   Instrument instrument = given.rig.instruments[index];
   const bool table = is_path(frames) && frames.cast<fs::path>().extension() == ".csv";
   std::optional<GivenFrames> source;
@@ -256,22 +223,19 @@ py::dict calibrate_registration(const py::object& frames, const py::object& rig,
   expect_result(registration.refusal, name);
   GivenRig after = given;
   after.rig.instruments[index] = registered(given.rig.instruments[index], registration);
-  py::dict result = result_of(after, {}, registered_numbers(instrument, registration), poses.read.complaint);
-  result["instrument"] = instrument.name;
-  result["camera_from_rcm"] = matrix_of(registration.camera_from_rcm);
-  result["sigma_translation_m"] = registration.sigma_translation_m;
-  result["sigma_quaternion_xyzw"] = registration.sigma_quaternion;
-  result["sigma_rotation_rad"] =
-      registration.sigma_quaternion ? std::optional(registration.sigma_rotation_rad) : std::nullopt;
-  const auto& arm = registration.arm;
-  result["sigma_offset"] = arm ? std::optional(arm->sigma_offset) : std::nullopt;
-  result["image_delay_s"] = arm ? std::optional(arm->image_delay_s) : std::nullopt;
-  result["sigma_image_delay_s"] = arm ? std::optional(arm->sigma_image_delay_s) : std::nullopt;
-  result["backlash"] = arm ? std::optional(arm->backlash) : std::nullopt;
-  result["residuals"] = residuals_of(registration);
-  result["faults"] = registration.faults;
-  result["unknown"] = registration.unknown;
-  return result;
+  const auto of_arm = [&](auto member) {
+    return registration.arm ? std::optional(*registration.arm.*member) : std::nullopt;
+  };
+  using Arm = Registration::Arm;
+  return result_of(after, {}, registered_numbers(instrument, registration), poses.read.complaint, registration,
+                   "instrument"_a = instrument.name, "camera_from_rcm"_a = matrix_of(registration.camera_from_rcm),
+                   "sigma_translation_m"_a = registration.sigma_translation_m,
+                   "sigma_quaternion_xyzw"_a = registration.sigma_quaternion,
+                   "sigma_rotation_rad"_a =
+                       registration.sigma_quaternion ? std::optional(registration.sigma_rotation_rad) : std::nullopt,
+                   "sigma_offset"_a = of_arm(&Arm::sigma_offset), "image_delay_s"_a = of_arm(&Arm::image_delay_s),
+                   "sigma_image_delay_s"_a = of_arm(&Arm::sigma_image_delay_s), "backlash"_a = of_arm(&Arm::backlash),
+                   "residuals"_a = residuals_of(registration), "unknown"_a = registration.unknown);
 }
 
 }  // namespace

@@ -14,13 +14,6 @@ namespace lapservo::python {
 namespace {
 using namespace internal;
 
-Marker checked(const Marker& marker) {
-  if (const auto problem = marker_problem(marker)) throw InputError("Marker", *problem);
-  if (const std::string problem = decoding_problem(marker); !problem.empty())
-    throw InputError("Marker", "not decodable: " + problem);
-  return marker;
-}
-
 Marker make_marker(double diameter_m, const Array<"bands_upper_m", 3>& bands_upper_m,
                    const Array<"bands_lower_m", 3>& bands_lower_m, const Array<"hues_deg", 3>& hues_deg,
                    double seam_rad, double tolerance_m, double wrap_m, double skew_m, double gap_rad) {
@@ -31,7 +24,7 @@ Marker make_marker(double diameter_m, const Array<"bands_upper_m", 3>& bands_upp
   marker.seam_rad = seam_rad;
   marker.tolerance_m = tolerance_m;
   marker.wrap_m = wrap_m, marker.skew_m = skew_m, marker.gap_rad = gap_rad;
-  return checked(marker);
+  return decodable(marker, "Marker");
 }
 
 Paper paper_of(const std::string& word) {

@@ -20,7 +20,6 @@
 #include "python/src/bindings.h"
 #include "python/src/controller.h"
 #include "python/src/conversions.h"
-#include "python/src/loop_asks.h"
 #include "transports/ros2/ros2_transport.h"
 
 namespace lapservo::python {
@@ -35,8 +34,8 @@ struct Node {
 
 class Ros2Robot : private Node, public CrtkRobot, public ArmOf {
  public:
-  Ros2Robot(const std::string& arm, const std::string& instrument, const InterlockConfig& interlock, const Clock& clock)
-      : CrtkRobot(transport, arm, interlock, clock), ArmOf{instrument} {}
+  Ros2Robot(const std::string& arm, const std::string& steered, const InterlockConfig& interlock, const Clock& clock)
+      : CrtkRobot(transport, arm, interlock, clock), ArmOf{steered} {}
 };
 
 class Ros2Camera : private Node, public ImageStream {

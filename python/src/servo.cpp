@@ -22,7 +22,6 @@
 #include "python/src/bindings.h"
 #include "python/src/controller.h"
 #include "python/src/conversions.h"
-#include "python/src/loop_asks.h"
 #include "python/src/observed.h"
 #include "python/src/python_frames.h"
 
@@ -302,6 +301,15 @@ class PythonObserver : public RunObserver {
   std::shared_ptr<const Rig> rig_;
 };
 
+// Of the estimate for now; None without one.
+template <typename Member>
+auto of_estimate(Member member) {
+  return [member](const Tick& self) {
+    const auto& estimate = self.step().estimate;
+    return estimate ? std::optional(*estimate.*member) : std::nullopt;
+  };
+}
+
 void bind_tick(py::module_& m) {
   py::class_<Tick>(m, "ControlTick", "One control tick: what the loop went by and what it decided.")
       .def_property_readonly("time_s", [](const Tick& self) { return self.tick.input.time_s; })
@@ -319,16 +327,9 @@ void bind_tick(py::module_& m) {
           "error",
           [](const Tick& self) { return self.step().estimate ? std::optional(self.step().error) : std::nullopt; },
           "float[4]: estimated features less the desired ones; None without an estimate")
-      .def_property_readonly(
-          "features",
-          [](const Tick& self) {
-            return self.step().estimate ? std::optional(self.step().estimate->features) : std::nullopt;
-          },
-          "float[4]: estimated for now; None without an estimate")
-      .def_property_readonly(
-          "q",
-          [](const Tick& self) { return self.step().estimate ? std::optional(self.step().estimate->q) : std::nullopt; },
-          "float[4]: estimated for now; None without an estimate")
+      .def_property_readonly("features", of_estimate(&Estimate::features),
+                             "float[4]: estimated for now; None without an estimate")
+      .def_property_readonly("q", of_estimate(&Estimate::q), "float[4]: estimated for now; None without an estimate")
       .def_property_readonly(
           "velocity", [](const Tick& self) { return self.step().velocity; }, "float[4], of the joints: rad/s, m/s")
       .def_property_readonly(

@@ -1,6 +1,7 @@
 """stubs.py TYPES OUT: the types of lapservo's extension with the docstrings and defaults that it has, as OUT.
 
-TYPES has neither; the package is that of PYTHONPATH, whose bindings begin each docstring with the signature.
+TYPES has neither, and `name: type` for a class's read-only property; the package is that of PYTHONPATH, whose bindings
+begin each docstring with the signature.
 """
 
 import ast
@@ -39,6 +40,11 @@ def complete(function, doc):
     return text
 
 
+def property_of(attribute):
+    text = f"@property\ndef {attribute.target.id}(self) -> {ast.unparse(attribute.annotation)}: ..."
+    return ast.parse(text).body[0]
+
+
 def document(node, thing):
     if isinstance(node, ast.ClassDef):
         for each in node.body:
@@ -55,6 +61,8 @@ def document(node, thing):
 
 tree = ast.parse(open(sys.argv[1]).read())
 for each in tree.body:
+    if isinstance(each, ast.ClassDef):
+        each.body = [property_of(one) if isinstance(one, ast.AnnAssign) else one for one in each.body]
     if isinstance(each, (ast.FunctionDef, ast.ClassDef)) and hasattr(lapservo, each.name):  # a build may lack ROS 2
         document(each, getattr(lapservo, each.name))
 with open(sys.argv[2], "w") as out:

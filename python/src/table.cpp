@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "lapservo/core/error.h"
+#include "lapservo/core/row_file.h"
 #include "lapservo/io/frame_source.h"
 #include "lapservo/io/tables/observation_csv.h"
 #include "python/src/bindings.h"
@@ -14,7 +15,6 @@
 
 namespace lapservo::python {
 namespace {
-using internal::ObservationCsv;
 
 // The columns of the CSV but for frame, time_s and file, which are the frame's.
 py::dict dict_of(const Observed& seen) {
@@ -35,15 +35,15 @@ py::dict dict_of(const Observed& seen) {
 // A context: what left it without an exception is a whole table.
 class Table {
  public:
-  explicit Table(const std::filesystem::path& path) : csv_(std::in_place, path) {}
+  explicit Table(const std::filesystem::path& path) : csv_(std::in_place, path, internal::observation_csv_header) {}
 
   void add(const std::vector<Observed>& observations, const Frame* frame) {
     if (!csv_) throw InputError("ObservationCsv.add", "is called after the end of the table's `with`");
     for (const Observed& seen : observations) {
       if (!frame && !seen.stamp_s)
         throw InputError("ObservationCsv.add", "stamp_s", "None", "a stamp given to track(), or the Frame");
-      csv_->add(frame ? frame->index : frames_, frame ? frame->time_s : *seen.stamp_s,
-                frame ? frame->file.filename().string() : "", seen.observation);
+      csv_->add(internal::observation_csv_row(frame ? frame->index : frames_, frame ? frame->time_s : *seen.stamp_s,
+                                              frame ? frame->file.filename().string() : "", seen.observation));
     }
     ++frames_;
   }
@@ -53,7 +53,7 @@ class Table {
   }
 
  private:
-  std::optional<ObservationCsv> csv_;  // until its end
+  std::optional<internal::RowFile> csv_;  // until its end
   int frames_ = 0;
 };
 

@@ -3,6 +3,7 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -12,9 +13,9 @@
 #include "lapservo/io/frame_source.h"
 #include "lapservo/io/image_file.h"
 #include "lapservo/io/overlay.h"
-#include "lapservo/io/pictures/png_encoding.h"
+#include "lapservo/io/pictures/png_picture.h"
 #include "lapservo/kinematics/centre_line.h"
-#include "lapservo/rig/instrument_index.h"
+#include "lapservo/rig/instruments.h"
 #include "python/src/bindings.h"
 #include "python/src/conversions.h"
 #include "python/src/observed.h"
@@ -47,13 +48,29 @@ py::object status_to_python(Status status) {
   return py::module_::import("lapservo._status").attr("Status")(std::string(to_string(status)));
 }
 
-// Numbers mean something of an observation that is ok only; of others they are None.
+// Numbers mean something of an observation that is ok only; of others they are None. `read`: a function of what was
+// observed, or a member of the observation.
 template <typename Read>
 auto when_ok(Read read) {
   return [read](const Observed& seen) {
-    using Value = decltype(read(seen));
-    return is_ok(seen) ? std::optional<Value>(read(seen)) : std::nullopt;
+    const auto value = [&] {
+      if constexpr (std::is_invocable_v<Read, const Observed&>)
+        return read(seen);
+      else
+        return seen.observation.*read;
+    };
+    return is_ok(seen) ? std::optional(value()) : std::nullopt;
   };
+}
+
+std::optional<Eigen::Vector4d> q_of(const Observed& seen) {
+  const auto& rcm = seen.observation.rcm;
+  return rcm ? std::optional(rcm->q.vector()) : std::nullopt;
+}
+
+std::optional<Eigen::Matrix4d> q_covariance_of(const Observed& seen) {
+  const auto& rcm = seen.observation.rcm;
+  return rcm ? std::optional(rcm->covariance) : std::nullopt;
 }
 
 Eigen::Vector4d features_of(const Observed& seen) {
@@ -152,31 +169,19 @@ Sigmas are one standard deviation. Of an observation whose status is not ok, eve
       .def_property_readonly(
           "instrument", [](const Observed& seen) { return seen.observation.instrument; }, "its name in the rig")
       .def_readonly("stamp_s", &Observed::stamp_s, "as given to track()")
-      .def_property_readonly(
-          "q",
-          [](const Observed& seen) {
-            const auto& rcm = seen.observation.rcm;
-            return is_ok(seen) && rcm ? std::optional(rcm->q.vector()) : std::nullopt;
-          },
-          "float[4]: theta, phi [rad], rho [m], psi [rad]; None without camera_from_rcm")
-      .def_property_readonly(
-          "q_covariance",
-          [](const Observed& seen) {
-            const auto& rcm = seen.observation.rcm;
-            return is_ok(seen) && rcm ? std::optional(rcm->covariance) : std::nullopt;
-          },
-          "float[4, 4], of q")
+      .def_property_readonly("q", when_ok(&q_of),
+                             "float[4]: theta, phi [rad], rho [m], psi [rad]; None without camera_from_rcm")
+      .def_property_readonly("q_covariance", when_ok(&q_covariance_of), "float[4, 4], of q")
       .def_property_readonly("features", when_ok(&features_of),
                              "float[4]: s [rad], r, l, d [px] (eq. 12 to 15); r is NaN where the RCM is unknown")
       .def_property_readonly("features_covariance", when_ok(&features_covariance_of),
                              "float[4, 4], of features, to first order; r's row and column are NaN where r is")
       .def_property_readonly("cross_ratio",
                              when_ok([](const Observed& seen) { return seen.observation.features.cross_ratio; }))
-      .def_property_readonly("tau_rad", when_ok([](const Observed& seen) { return seen.observation.tau_rad; }),
+      .def_property_readonly("tau_rad", when_ok(&Observation::tau_rad),
                              "azimuth of the marker on the centre line, [0, 2 pi)")
-      .def_property_readonly("sigma_tau_rad",
-                             when_ok([](const Observed& seen) { return seen.observation.sigma_tau_rad; }))
-      .def_property_readonly("p_false", when_ok([](const Observed& seen) { return seen.observation.p_false; }),
+      .def_property_readonly("sigma_tau_rad", when_ok(&Observation::sigma_tau_rad))
+      .def_property_readonly("p_false", when_ok(&Observation::p_false),
                              "probability that psi and tau are off by more than 0.1 rad; None by method 'centerline'")
       .def_property_readonly("edges_px",
                              when_ok([](const Observed& seen) { return points_of(seen.observation.edges_raw_px); }),
@@ -184,14 +189,11 @@ Sigmas are one standard deviation. Of an observation whose status is not ok, eve
       .def_property_readonly("edges_ideal_px",
                              when_ok([](const Observed& seen) { return points_of(seen.observation.edges_ideal_px); }),
                              "float[4, 2]: the same, undistorted")
-      .def_property_readonly("edges_covariance_px2",
-                             when_ok([](const Observed& seen) { return seen.observation.edges_covariance_px2; }),
+      .def_property_readonly("edges_covariance_px2", when_ok(&Observation::edges_covariance_px2),
                              "float[8, 8], of edges_ideal_px, row by row")
+      .def_property_readonly("marker_pose", when_ok(&Observation::marker), "MarkerPose; None by method 'centerline'")
       .def_property_readonly(
-          "marker_pose", [](const Observed& seen) { return is_ok(seen) ? seen.observation.marker : std::nullopt; },
-          "MarkerPose; None by method 'centerline'")
-      .def_property_readonly(
-          "tip", [](const Observed& seen) { return is_ok(seen) ? seen.observation.tip : std::nullopt; },
+          "tip", when_ok(&Observation::tip),
           "TipPose; None where the rig has no tool, or no place of it, or its wrist's readings are not set")
       .def("overlay", &overlay, py::arg("image"),
            "The frame with what was seen drawn in, as a new uint8[H, W, 3]; what was refused in dashes.")

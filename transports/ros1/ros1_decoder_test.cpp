@@ -51,7 +51,7 @@ TEST(Ros1Decoder, ReadsWhatRosWritesAndRefusesWhatIsCutShortOrLeftOver) {
 }
 
 TEST(Ros1Decoder, SkipsWhatItDoesNotUse) {
-  ros1::JointState wire;
+  Ros1Type<JointMessage> wire;
   wire.header.seq = 7;
   wire.header.frame_id = "base";
   wire.name = {"yaw"};
@@ -64,7 +64,7 @@ TEST(Ros1Decoder, SkipsWhatItDoesNotUse) {
 }
 
 TEST(Ros1Decoder, AStampThatIsNoneIsNotANumber) {
-  ros1::JointState wire;
+  Ros1Type<JointMessage> wire;
   wire.header.stamp.sec = 5;
   wire.header.stamp.nsec = 1000000000u;
   EXPECT_TRUE(std::isnan(decode_ros1<JointMessage>(bytes_of(wire))->stamp_s));
@@ -76,11 +76,12 @@ TEST(Ros1Decoder, AStampThatIsNoneIsNotANumber) {
 // As in collaborative-robotics/crtk_msgs for ROS 1, so that its nodes take ours for theirs.
 TEST(Ros1Messages, CarryTheTypesSums) {
   using namespace ros::message_traits;
-  EXPECT_STREQ(md5sum<ros1::OperatingState>(), "b1bd4021639d9d9c5fbfff78d6ff3158");
-  EXPECT_STREQ(md5sum<ros1::StringStamped>(), "5e3e46086181199270f1ac3a28a5977f");
-  EXPECT_STREQ(datatype<ros1::OperatingState>(), "crtk_msgs/OperatingState");
-  EXPECT_STREQ(datatype<ros1::Observation>(), "lapservo_msgs/Observation");
-  for (const std::string definition : {definition<ros1::OperatingState>(), definition<ros1::Observation>()}) {
+  EXPECT_STREQ(md5sum<Ros1Type<OperatingStateMessage>>(), "b1bd4021639d9d9c5fbfff78d6ff3158");
+  EXPECT_STREQ(md5sum<Ros1Type<StringMessage>>(), "5e3e46086181199270f1ac3a28a5977f");
+  EXPECT_STREQ(datatype<Ros1Type<OperatingStateMessage>>(), "crtk_msgs/OperatingState");
+  EXPECT_STREQ(datatype<Ros1Type<ObservationMessage>>(), "lapservo_msgs/Observation");
+  for (const std::string definition :
+       {definition<Ros1Type<OperatingStateMessage>>(), definition<Ros1Type<ObservationMessage>>()}) {
     EXPECT_NE(definition.find("MSG: std_msgs/Header\n"), std::string::npos) << definition;
     EXPECT_NE(definition.find("uint32 seq\n"), std::string::npos) << definition;
   }
@@ -110,8 +111,8 @@ TEST(Ros1Messages, TellOfTheLoop) {
   EXPECT_EQ(std::tuple(band.ns, band.id, band.type, band.scale.x, band.scale.z, band.color.a, band.lifetime.toSec()),
             std::tuple("PSM1", 1, 3, 0.5, 0.25, 0.125f, 0.5));
   // ros/common_msgs' and ros/geometry2's own.
-  EXPECT_STREQ(ros::message_traits::md5sum<ros1::MarkerArray>(), "d155b9ce5188fbaf89745847fd5882d7");
-  EXPECT_STREQ(ros::message_traits::md5sum<ros1::TFMessage>(), "94810edda583a504dfda3829e70d7eec");
+  EXPECT_STREQ(ros::message_traits::md5sum<Ros1Type<CylindersMessage>>(), "d155b9ce5188fbaf89745847fd5882d7");
+  EXPECT_STREQ(ros::message_traits::md5sum<Ros1Type<TransformsMessage>>(), "94810edda583a504dfda3829e70d7eec");
 
   const auto state_wire = ros1_message(
       DiagnosticMessage{stamp_s, DiagnosticMessage::Level::warning, "lapservo", "hold", {{"reason", "outlier"}}});

@@ -1,25 +1,32 @@
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <crtk_msgs/OperatingState.h>
 #include <crtk_msgs/StringStamped.h>
 #include <cstddef>
+#include <cstdint>
 #include <diagnostic_msgs/DiagnosticArray.h>
 #include <geometry_msgs/PoseStamped.h>
 #include <geometry_msgs/PoseWithCovarianceStamped.h>
 #include <lapservo_msgs/Observation.h>
 #include <memory>
+#include <ros/time.h>
 #include <sensor_msgs/CameraInfo.h>
 #include <sensor_msgs/CompressedImage.h>
 #include <sensor_msgs/Image.h>
 #include <sensor_msgs/JointState.h>
 #include <sensor_msgs/Joy.h>
 #include <std_msgs/Bool.h>
+#include <string>
 #include <tf2_msgs/TFMessage.h>
 #include <trajectory_msgs/JointTrajectory.h>
 #include <type_traits>
+#include <utility>
 #include <visualization_msgs/MarkerArray.h>
 
 #include "lapservo/crtk/messages.h"
+#include "transports/typed_fields.h"
 
 namespace lapservo::internal {
 
@@ -32,39 +39,66 @@ struct Ros1Allocator : std::allocator<T> {
     using other = std::conditional_t<std::is_same_v<Other, char>, std::allocator<char>, Ros1Allocator<Other>>;
   };
 };
-namespace ros1 {
-using JointState = sensor_msgs::JointState_<Ros1Allocator<std::byte>>;
-using Joy = sensor_msgs::Joy_<Ros1Allocator<std::byte>>;
-using Bool = std_msgs::Bool_<Ros1Allocator<std::byte>>;
-using JointTrajectory = trajectory_msgs::JointTrajectory_<Ros1Allocator<std::byte>>;
-using OperatingState = crtk_msgs::OperatingState_<Ros1Allocator<std::byte>>;
-using StringStamped = crtk_msgs::StringStamped_<Ros1Allocator<std::byte>>;
-using Image = sensor_msgs::Image_<Ros1Allocator<std::byte>>;
-using CompressedImage = sensor_msgs::CompressedImage_<Ros1Allocator<std::byte>>;
-using CameraInfo = sensor_msgs::CameraInfo_<Ros1Allocator<std::byte>>;
-using PoseWithCovarianceStamped = geometry_msgs::PoseWithCovarianceStamped_<Ros1Allocator<std::byte>>;
-using PoseStamped = geometry_msgs::PoseStamped_<Ros1Allocator<std::byte>>;
-using TFMessage = tf2_msgs::TFMessage_<Ros1Allocator<std::byte>>;
-using MarkerArray = visualization_msgs::MarkerArray_<Ros1Allocator<std::byte>>;
-using DiagnosticArray = diagnostic_msgs::DiagnosticArray_<Ros1Allocator<std::byte>>;
-using Observation = lapservo_msgs::Observation_<Ros1Allocator<std::byte>>;
-}  // namespace ros1
 
-// A message as ROS 1's type.
-ros1::JointState ros1_message(const JointMessage& message);
-ros1::Joy ros1_message(const JoyMessage& message);
-ros1::Bool ros1_message(const BoolMessage& message);
-ros1::JointTrajectory ros1_message(const TrajectoryMessage& message);
-ros1::OperatingState ros1_message(const OperatingStateMessage& message);
-ros1::StringStamped ros1_message(const StringMessage& message);
-ros1::Image ros1_message(const ImageMessage& message);
-ros1::CompressedImage ros1_message(const CompressedImageMessage& message);
-ros1::CameraInfo ros1_message(const CameraInfoMessage& message);
-ros1::PoseWithCovarianceStamped ros1_message(const PoseMessage& message);
-ros1::PoseStamped ros1_message(const PlaceMessage& message);
-ros1::TFMessage ros1_message(const TransformsMessage& message);
-ros1::MarkerArray ros1_message(const CylindersMessage& message);
-ros1::DiagnosticArray ros1_message(const DiagnosticMessage& message);
-ros1::Observation ros1_message(const ObservationMessage& message);
+// The type of ROS 1 that carries a message.
+using Ros1ByteAllocator = Ros1Allocator<std::byte>;
+sensor_msgs::JointState_<Ros1ByteAllocator> ros1_type_of(const JointMessage&);
+sensor_msgs::Joy_<Ros1ByteAllocator> ros1_type_of(const JoyMessage&);
+std_msgs::Bool_<Ros1ByteAllocator> ros1_type_of(const BoolMessage&);
+trajectory_msgs::JointTrajectory_<Ros1ByteAllocator> ros1_type_of(const TrajectoryMessage&);
+crtk_msgs::OperatingState_<Ros1ByteAllocator> ros1_type_of(const OperatingStateMessage&);
+crtk_msgs::StringStamped_<Ros1ByteAllocator> ros1_type_of(const StringMessage&);
+sensor_msgs::Image_<Ros1ByteAllocator> ros1_type_of(const ImageMessage&);
+sensor_msgs::CompressedImage_<Ros1ByteAllocator> ros1_type_of(const CompressedImageMessage&);
+sensor_msgs::CameraInfo_<Ros1ByteAllocator> ros1_type_of(const CameraInfoMessage&);
+geometry_msgs::PoseWithCovarianceStamped_<Ros1ByteAllocator> ros1_type_of(const PoseMessage&);
+geometry_msgs::PoseStamped_<Ros1ByteAllocator> ros1_type_of(const PlaceMessage&);
+tf2_msgs::TFMessage_<Ros1ByteAllocator> ros1_type_of(const TransformsMessage&);
+visualization_msgs::MarkerArray_<Ros1ByteAllocator> ros1_type_of(const CylindersMessage&);
+diagnostic_msgs::DiagnosticArray_<Ros1ByteAllocator> ros1_type_of(const DiagnosticMessage&);
+lapservo_msgs::Observation_<Ros1ByteAllocator> ros1_type_of(const ObservationMessage&);
+template <typename Message>
+using Ros1Type = decltype(ros1_type_of(std::declval<const Message&>()));
+
+inline ros::Time ros1_time(double stamp_s) {
+  constexpr double last_s = 4294967295.0;
+  if (!(stamp_s >= 0 && stamp_s <= last_s)) return {};
+  const double whole = std::floor(stamp_s);
+  return {static_cast<std::uint32_t>(whole),
+          static_cast<std::uint32_t>(std::min(std::round((stamp_s - whole) * 1e9), 999999999.0))};
+}
+
+/// Puts fields() into such a type.
+struct PutIntoRos1 {
+  void operator()(auto& to, const auto& from) const {
+    if constexpr (requires { to.assign(from.begin(), from.end()); }) {
+      to.assign(from.begin(), from.end());
+    } else if constexpr (requires { from.begin(); }) {
+      std::copy(from.begin(), from.end(), to.begin());
+    } else {
+      to = static_cast<std::remove_reference_t<decltype(to)>>(from);
+    }
+  }
+  void written(auto& to, const auto& from) const { (*this)(to, from); }
+  void header(auto& to, double stamp_s, const std::string& frame = no_text) const {
+    to.stamp = ros1_time(stamp_s);
+    to.frame_id = frame;
+  }
+  void seconds(auto& to, double time_s) const { to.fromSec(time_s); }
+  void pose(auto& to, const Rigid3& from) const { set(to, from); }
+  void list(auto& to, const auto& from, auto put_one) const {
+    to.resize(from.size());
+    for (std::size_t i = 0; i < from.size(); ++i) put_one(to[i], from[i]);
+  }
+};
+
+/// A message as ROS 1's type.
+template <typename Message>
+Ros1Type<Message> ros1_message(const Message& message) {
+  Ros1Type<Message> wire;
+  const PutIntoRos1 put;
+  fields(put, wire, message);
+  return wire;
+}
 
 }  // namespace lapservo::internal

@@ -2,7 +2,6 @@
 
 #include <charconv>
 
-#include "lapservo/core/environment.h"
 #include "lapservo/core/error.h"
 #include "transports/full_name.h"
 
@@ -32,10 +31,6 @@ MasterAddress master_address(const std::string& text) {
 
 std::string to_string(const MasterAddress& address) {
   return "http://" + address.host + ":" + std::to_string(address.port);
-}
-
-std::string ros1_namespace() {
-  return environment("ROS_NAMESPACE");
 }
 
 std::string resolved_ros1_name(const std::string& name, const std::string& ros_namespace, const std::string& what) {

@@ -15,9 +15,6 @@ MasterAddress master_address(const std::string& text);
 /// "http://host:port".
 std::string to_string(const MasterAddress& address);
 
-/// ROS_NAMESPACE; empty when it is unset.
-std::string ros1_namespace();
-
 /// A topic's or arm's full name: "/dvrk/PSM1" of "PSM1" in the namespace "dvrk" or "/dvrk/"; "/PSM1" stays. Throws
 /// InputError, naming `what`, for what is no name in ROS 1.
 std::string resolved_ros1_name(const std::string& name, const std::string& ros_namespace, const std::string& what);

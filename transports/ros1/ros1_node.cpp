@@ -100,7 +100,7 @@ std::shared_ptr<Ros1Node> Ros1Node::get(const std::string& name) {
 
 // Checks beforehand the errors at which roscpp ends the process or waits without end.
 Ros1Node::Ros1Node(const std::string& name) : master_(master_address(environment("ROS_MASTER_URI"))) {
-  resolved_ros1_name(name, ros1_namespace(), "ROS_NAMESPACE");
+  resolved_ros1_name(name, environment("ROS_NAMESPACE"), "ROS_NAMESPACE");
   require_ros1_master(master_);
   ros::console::initialize();
   ros::console::backend::function_print = say;

@@ -26,40 +26,24 @@
 
 namespace lapservo::internal {
 
-/// The type of ROS 1 that carries a message.
-template <typename Message>
-using Ros1Type = decltype(ros1_message(std::declval<const Message&>()));
-
-/// The content of the type that carries Message: empty when it can't be read. roscpp's own deserialiser would reserve
+/// The content of a topic that carries Message: empty when it can't be read. roscpp's own deserialiser would reserve
 /// the size that a message claims.
 template <typename Message>
 struct Ros1Received {
   std::optional<Message> message;
-};
-
-/// Either type of a button, which its publisher names.
-template <>
-struct Ros1Received<BoolMessage> {
-  std::optional<BoolMessage> message;
-  std::string type;
+  std::string type;  ///< as its publisher names it
 };
 
 /// Whether a topic of any type carries it.
 template <typename Message>
 constexpr bool is_of_any_type = std::is_same_v<Message, BoolMessage> || std::is_same_v<Message, CommandMessage>;
 
-/// As Message is on the wire, in words.
+/// The types that carry Message, in words.
 template <typename Message>
 std::string ros1_types() {
-  return ros::message_traits::datatype<Ros1Type<Message>>();
-}
-template <>
-inline std::string ros1_types<BoolMessage>() {
-  return "std_msgs/Bool or sensor_msgs/Joy";
-}
-template <>
-inline std::string ros1_types<CommandMessage>() {
-  return "a command";
+  if constexpr (std::is_same_v<Message, BoolMessage>) return "std_msgs/Bool or sensor_msgs/Joy";
+  if constexpr (std::is_same_v<Message, CommandMessage>) return "a command";
+  if constexpr (!is_of_any_type<Message>) return ros::message_traits::datatype<Ros1Type<Message>>();
 }
 
 /// The type of a topic that is published by the master's word, when it is another one.
@@ -143,7 +127,7 @@ class Ros1Subscription {
   }
   // A publisher of another type refuses, of which roscpp says nothing.
   void look_for_other_types() {
-    const std::string type = ros::message_traits::datatype<Ros1Type<Message>>();
+    const std::string type = ros1_types<Message>();
     const auto other = node_->answers() ? other_type_on(subscriber_.getTopic(), type) : std::nullopt;
     connected_ = subscriber_.getNumPublishers() > 0;
     if (!other || connected_ || ++refused_ < 2) return;  // a connection takes its time
@@ -169,68 +153,58 @@ class Ros1Subscription {
 
 }  // namespace lapservo::internal
 
-namespace ros::message_traits {
+namespace ros {
+namespace message_traits {
 
 template <typename Message>
-struct MD5Sum<lapservo::internal::Ros1Received<Message>> : MD5Sum<lapservo::internal::Ros1Type<Message>> {};
-
-template <typename Message>
-struct DataType<lapservo::internal::Ros1Received<Message>> : DataType<lapservo::internal::Ros1Type<Message>> {};
-
-template <typename Message>
-requires lapservo::internal::is_of_any_type<Message>
 struct MD5Sum<lapservo::internal::Ros1Received<Message>> {
-  static const char* value() { return "*"; }
+  static const char* value() {
+    if constexpr (lapservo::internal::is_of_any_type<Message>)
+      return "*";
+    else
+      return md5sum<lapservo::internal::Ros1Type<Message>>();
+  }
 };
 
 template <typename Message>
-requires lapservo::internal::is_of_any_type<Message>
-struct DataType<lapservo::internal::Ros1Received<Message>> : MD5Sum<lapservo::internal::Ros1Received<Message>> {
+struct DataType<lapservo::internal::Ros1Received<Message>> {
+  static const char* value() {
+    if constexpr (lapservo::internal::is_of_any_type<Message>)
+      return "*";
+    else
+      return datatype<lapservo::internal::Ros1Type<Message>>();
+  }
 };
 
+}  // namespace message_traits
+
+namespace serialization {
+
 template <typename Message>
-struct Definition<lapservo::internal::Ros1Received<Message>> : Definition<lapservo::internal::Ros1Type<Message>> {};
-
-}  // namespace ros::message_traits
-
-namespace ros::serialization {
+struct PreDeserialize<lapservo::internal::Ros1Received<Message>> {
+  static void notify(const PreDeserializeParams<lapservo::internal::Ros1Received<Message>>& params) {
+    if constexpr (std::is_same_v<Message, lapservo::internal::BoolMessage>)
+      params.message->type = (*params.connection_header)["type"];
+  }
+};
 
 template <typename Message>
 struct Serializer<lapservo::internal::Ros1Received<Message>> {
   template <typename Stream>
   static void read(Stream& stream, lapservo::internal::Ros1Received<Message>& received) {
-    received.message =
-        lapservo::internal::decode_ros1<Message>(std::span<const std::uint8_t>(stream.getData(), stream.getLength()));
-  }
-};
-
-template <>
-struct PreDeserialize<lapservo::internal::Ros1Received<lapservo::internal::BoolMessage>> {
-  using Received = lapservo::internal::Ros1Received<lapservo::internal::BoolMessage>;
-  static void notify(const PreDeserializeParams<Received>& params) {
-    params.message->type = (*params.connection_header)["type"];
-  }
-};
-
-template <>
-struct Serializer<lapservo::internal::Ros1Received<lapservo::internal::CommandMessage>> {
-  template <typename Stream>
-  static void read(Stream&, lapservo::internal::Ros1Received<lapservo::internal::CommandMessage>& received) {
-    received.message.emplace();
-  }
-};
-
-template <>
-struct Serializer<lapservo::internal::Ros1Received<lapservo::internal::BoolMessage>> {
-  template <typename Stream>
-  static void read(Stream& stream, lapservo::internal::Ros1Received<lapservo::internal::BoolMessage>& received) {
     using namespace lapservo::internal;
     const std::span<const std::uint8_t> bytes(stream.getData(), stream.getLength());
-    if (received.type == ros::message_traits::datatype<ros1::Bool>())
+    if constexpr (std::is_same_v<Message, CommandMessage>) {
+      received.message.emplace();
+    } else if constexpr (!std::is_same_v<Message, BoolMessage>) {
+      received.message = decode_ros1<Message>(bytes);
+    } else if (received.type == message_traits::datatype<Ros1Type<BoolMessage>>()) {
       received.message = decode_ros1<BoolMessage>(bytes);
-    if (received.type != ros::message_traits::datatype<ros1::Joy>()) return;
-    if (const auto joy = decode_ros1<JoyMessage>(bytes)) received.message = first_button(*joy);
+    } else if (received.type == message_traits::datatype<Ros1Type<JoyMessage>>()) {
+      if (const auto joy = decode_ros1<JoyMessage>(bytes)) received.message = first_button(*joy);
+    }
   }
 };
 
-}  // namespace ros::serialization
+}  // namespace serialization
+}  // namespace ros

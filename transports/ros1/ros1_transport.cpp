@@ -9,12 +9,11 @@
 #include <ros/ros.h>
 #include <stdexcept>
 #include <string>
-#include <type_traits>
 #include <utility>
 #include <variant>
 #include <xmlrpcpp/XmlRpcValue.h>
 
-#include "lapservo/core/wall_clock.h"
+#include "lapservo/core/environment.h"
 #include "transports/ros1/ros1_names.h"
 #include "transports/ros1/ros1_node.h"
 #include "transports/ros1/ros1_subscription.h"
@@ -52,16 +51,8 @@ namespace {
 constexpr std::uint32_t few = 10;    // as ROS 2 keeps by default
 constexpr std::uint32_t newest = 2;  // of images
 
-// Messages of a topic that are kept until they are taken, of all its publishers: whoever floods it must not push
-// another one's out. 30,000 texts a second take longer than 0.1 s to do so.
-template <typename Message>
-constexpr std::uint32_t depth_of() {
-  if (std::is_same_v<Message, StringMessage>) return 5000;
-  return std::is_same_v<Message, OperatingStateMessage> ? 1000 : few;
-}
-
 std::string full_name(const std::string& topic) {
-  return resolved_ros1_name(topic, ros1_namespace(), "topic");
+  return resolved_ros1_name(topic, environment("ROS_NAMESPACE"), "topic");
 }
 
 template <typename Message>
@@ -69,11 +60,9 @@ Transport::Publisher<Message> made_publisher(const std::shared_ptr<Ros1Node>& no
                                              const std::shared_ptr<Ros1Readers>& readers, const std::string& topic,
                                              std::uint32_t queue_size, bool latched = false) {
   ros::AdvertiseOptions options;
-  const auto peer = [](void (Ros1Readers::*tell)(const ros::SingleSubscriberPublisher&), Ros1Readers* to) {
-    return [tell, to](const ros::SingleSubscriberPublisher& reader) { (to->*tell)(reader); };
-  };
-  options.init<Ros1Type<Message>>(full_name(topic), queue_size, peer(&Ros1Readers::add, readers.get()),
-                                  peer(&Ros1Readers::remove, readers.get()));
+  options.init<Ros1Type<Message>>(
+      full_name(topic), queue_size, [to = readers.get()](const auto& reader) { to->add(reader); },
+      [to = readers.get()](const auto& reader) { to->remove(reader); });
   options.latch = latched;
   options.callback_queue = readers->queue();
   const ros::Publisher to = ros::NodeHandle().advertise(options);
@@ -87,12 +76,6 @@ Transport::Publisher<Message> made_publisher(const std::shared_ptr<Ros1Node>& no
   return [shared, latched](const Message& message) {
     if (latched || shared->getNumSubscribers() > 0) shared->publish(ros1_message(message));
   };
-}
-
-template <typename Message>
-Transport::Subscription made_subscription(const std::shared_ptr<Ros1Node>& node, const std::string& topic,
-                                          std::uint32_t queue_size, const Transport::Handler<Message>& handler) {
-  return std::make_shared<Ros1Subscription<Message>>(node, full_name(topic), queue_size, handler);
 }
 
 }  // namespace
@@ -132,10 +115,6 @@ std::map<std::string, std::string> Ros1Transport::published() const {
   return published;
 }
 
-double Ros1Transport::stamp_now_s() const {
-  return since_1970_s();
-}
-
 void Ros1Transport::open(const std::string& topic, AnyPublisher& made) {
   const auto make = [&]<typename Message>(Publisher<Message>& one) {
     one = made_publisher<Message>(node_, readers_, topic, is_image<Message> ? newest : few, is_latched<Message>);
@@ -148,15 +127,16 @@ Transport::Publisher<JointMessage> Ros1Transport::set_point_publisher(const std:
 }
 
 Transport::Subscription Ros1Transport::listen(const std::string& topic, const AnyHandler& handler) {
-  const auto subscribe = [&]<typename Message>(const Handler<Message>& one) {
-    return made_subscription<Message>(node_, topic, is_image<Message> ? newest : depth_of<Message>(), one);
+  const auto subscribe = [&]<typename Message>(const Handler<Message>& one) -> Subscription {
+    const std::uint32_t queue_size = is_image<Message> ? newest : depth<Message>.value_or(few);
+    return std::make_shared<Ros1Subscription<Message>>(node_, full_name(topic), queue_size, one);
   };
   return std::visit(subscribe, handler);
 }
 
 Transport::Subscription Ros1Transport::subscribe_commands(const std::string& topic, CommandType,
                                                           Handler<CommandMessage> handler) {
-  return made_subscription<CommandMessage>(node_, topic, few, handler);
+  return std::make_shared<Ros1Subscription<CommandMessage>>(node_, full_name(topic), few, handler);
 }
 
 }  // namespace lapservo::internal

@@ -178,7 +178,6 @@ TEST_F(Ros1Wire, NoTopicWaitsForAnother) {
   release = true;
 }
 
-// While the subscriber is kept busy.
 TEST_F(Ros1Wire, AStopIsHeardThoughAnotherFloodsItsTopic) {
   const testing::Process flooder(LAPSERVO_ROS1_PEER, {"flooder"});
   std::atomic<bool> release = false, found = false, stopped = false;

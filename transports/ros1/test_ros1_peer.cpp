@@ -16,7 +16,7 @@
 namespace {
 
 // Says that it is a JointState, and is what its bytes are.
-struct Pretender {
+struct Pretender : lapservo::internal::Ros1Type<lapservo::internal::JointMessage> {
   std::vector<std::uint8_t> bytes;
 };
 
@@ -34,20 +34,11 @@ namespace ros {
 namespace message_traits {
 
 template <>
-struct MD5Sum<Pretender> : MD5Sum<lapservo::internal::ros1::JointState> {
-  using MD5Sum<lapservo::internal::ros1::JointState>::value;
-  static const char* value(const Pretender&) { return value(); }
-};
+struct MD5Sum<Pretender> : MD5Sum<lapservo::internal::Ros1Type<lapservo::internal::JointMessage>> {};
 template <>
-struct DataType<Pretender> : DataType<lapservo::internal::ros1::JointState> {
-  using DataType<lapservo::internal::ros1::JointState>::value;
-  static const char* value(const Pretender&) { return value(); }
-};
+struct DataType<Pretender> : DataType<lapservo::internal::Ros1Type<lapservo::internal::JointMessage>> {};
 template <>
-struct Definition<Pretender> : Definition<lapservo::internal::ros1::JointState> {
-  using Definition<lapservo::internal::ros1::JointState>::value;
-  static const char* value(const Pretender&) { return value(); }
-};
+struct Definition<Pretender> : Definition<lapservo::internal::Ros1Type<lapservo::internal::JointMessage>> {};
 
 }  // namespace message_traits
 
@@ -96,8 +87,10 @@ int main(int argc, char** argv) {
   const auto text = transport.publisher<StringMessage>("/out/text");
   subscriptions.push_back(transport.subscribe<StringMessage>("/in/text", [&](StringMessage&& m) {
     if (m.text == "pretend") {
-      pretender.publish(Pretender{std::vector<std::uint8_t>(40, 0xff)});
-      pretender.publish(Pretender{});
+      Pretender pretended;
+      pretended.bytes.assign(40, 0xff);
+      pretender.publish(pretended);
+      pretender.publish(Pretender());
     }
     if (m.text == "flood" && name == "flooder") flood(text);
     if (m.text == "who") m.text = name;

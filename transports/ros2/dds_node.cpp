@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <stdexcept>
+#include <type_traits>
 
 #include <fmt/format.h>
 
@@ -119,57 +120,54 @@ dds_entity_t create_participant(std::uint32_t domain) {
   return checked(dds_create_participant(domain, qos.get(), nullptr), "participant");
 }
 
-// Up to Humble a Gid had 24 bytes.
+// Up to Humble a Gid had 24 bytes: WideInfo.
 bool has_wide_gids() {
   const std::string name = environment("ROS_DISTRO");
   return name == "humble" || name == "galactic" || name == "foxy";
 }
 
-// ParticipantEntitiesInfo, in either width.
-template <typename Info, typename Node, typename Gid>
-class Announcement {
- public:
-  Announcement(const std::string& name, dds_entity_t participant, const std::vector<dds_entity_t>& readers,
-               const std::vector<dds_entity_t>& writers)
-      : readers_(gids(readers)), writers_(gids(writers)) {
-    node_.node_namespace_[0] = '/';
-    name.copy(node_.node_name_, sizeof node_.node_name_ - 1);
-    const auto point = [](auto& sequence, auto* items, std::size_t count) {
-      sequence._length = sequence._maximum = static_cast<std::uint32_t>(count);
-      sequence._buffer = items;
-    };
-    point(node_.reader_gid_seq_, readers_.data(), readers_.size());
-    point(node_.writer_gid_seq_, writers_.data(), writers_.size());
-    info_.gid_ = gid(participant);
-    point(info_.node_entities_info_seq_, &node_, 1);
-  }
-  Announcement(const Announcement&) = delete;
-  Announcement& operator=(const Announcement&) = delete;
-  void write(dds_entity_t writer) const { dds_write(writer, &info_); }
+using Info = rmw_dds_common_msg_dds__ParticipantEntitiesInfo_;
+using WideInfo = rmw_dds_common_humble_msg_dds__ParticipantEntitiesInfo_;
 
- private:
-  static Gid gid(dds_entity_t entity) {
-    Gid gid{};
+template <typename AnyInfo>
+void write_announcement(dds_entity_t writer, const std::string& name, dds_entity_t participant,
+                        const std::vector<dds_entity_t>& readers, const std::vector<dds_entity_t>& writers) {
+  AnyInfo info{};
+  std::decay_t<decltype(*info.node_entities_info_seq._buffer)> node{};
+  const auto put_gid = [](dds_entity_t entity, auto& to) {
     dds_guid_t guid{};
     dds_get_guid(entity, &guid);
-    std::memcpy(gid.data_, guid.v, sizeof guid.v);
-    return gid;
-  }
-  static std::vector<Gid> gids(const std::vector<dds_entity_t>& entities) {
-    std::vector<Gid> all;
-    for (const dds_entity_t entity : entities) all.push_back(gid(entity));
-    return all;
-  }
+    std::memcpy(to.data, guid.v, sizeof guid.v);
+  };
+  const auto put_gids = [&](const std::vector<dds_entity_t>& entities, auto& to, auto& kept) {
+    kept.resize(entities.size());
+    for (std::size_t i = 0; i < entities.size(); ++i) put_gid(entities[i], kept[i]);
+    to._length = to._maximum = static_cast<std::uint32_t>(kept.size());
+    to._buffer = kept.data();
+  };
+  std::vector<decltype(info.gid)> reader_gids, writer_gids;
+  put_gids(readers, node.reader_gid_seq, reader_gids);
+  put_gids(writers, node.writer_gid_seq, writer_gids);
+  node.node_namespace[0] = '/';
+  name.copy(node.node_name, sizeof node.node_name - 1);
+  put_gid(participant, info.gid);
+  info.node_entities_info_seq._length = info.node_entities_info_seq._maximum = 1;
+  info.node_entities_info_seq._buffer = &node;
+  dds_write(writer, &info);
+}
 
-  std::vector<Gid> readers_, writers_;
-  Node node_{};
-  Info info_{};
-};
-using Announced = Announcement<rmw_dds_common_msg_dds__ParticipantEntitiesInfo_,
-                               rmw_dds_common_msg_dds__NodeEntitiesInfo_, rmw_dds_common_msg_dds__Gid_>;
-using WideAnnounced =
-    Announcement<rmw_dds_common_humble_msg_dds__ParticipantEntitiesInfo_,
-                 rmw_dds_common_humble_msg_dds__NodeEntitiesInfo_, rmw_dds_common_humble_msg_dds__Gid_>;
+// All that a reader has, one after the other.
+template <typename Sample>
+void take_all(dds_entity_t reader, const auto& take) {
+  constexpr int at_once = 64;
+  std::array<void*, at_once> samples{};
+  std::array<dds_sample_info_t, at_once> infos;
+  for (int count; (count = dds_take(reader, samples.data(), infos.data(), at_once, at_once)) > 0;) {
+    for (int i = 0; i < count; ++i)
+      if (infos[i].valid_data) take(*static_cast<const Sample*>(samples[i]));
+    dds_return_loan(reader, samples.data(), count);
+  }
+}
 
 dds_topic_descriptor_t announcement_type(bool wide_gids) {
   dds_topic_descriptor_t type = wide_gids ? rmw_dds_common_humble_msg_dds__ParticipantEntitiesInfo__desc
@@ -189,8 +187,8 @@ class NodeNames {
     reader_ = checked(dds_create_reader(participant, topic, qos.get(), nullptr), "reader");
   }
   std::string of(const dds_builtintopic_endpoint_t& reader) {
-    wide_gids_ ? take<rmw_dds_common_humble_msg_dds__ParticipantEntitiesInfo_>()
-               : take<rmw_dds_common_msg_dds__ParticipantEntitiesInfo_>();
+    const auto note = [this](const auto& info) { this->note(info); };
+    wide_gids_ ? take_all<WideInfo>(reader_, note) : take_all<Info>(reader_, note);
     const Id id = id_of(reader.key.v);
     const auto& names = names_[id_of(reader.participant_key.v)];
     const auto name = names.find(id);
@@ -209,28 +207,16 @@ class NodeNames {
     const bool is_fast_dds = guid[0] == 0x01 && guid[1] == 0x0f;
     return fmt::format("{:02x}", fmt::join(guid.begin(), guid.begin() + (is_fast_dds ? 4 : 12), ""));
   }
-  template <typename Info>
-  void take() {
-    constexpr int at_once = 16;
-    std::array<void*, at_once> samples{};
-    std::array<dds_sample_info_t, at_once> infos;
-    for (int count; (count = dds_take(reader_, samples.data(), infos.data(), at_once, at_once)) > 0;) {
-      for (int i = 0; i < count; ++i)
-        if (infos[i].valid_data) note(*static_cast<const Info*>(samples[i]));
-      dds_return_loan(reader_, samples.data(), count);
-    }
-  }
-  template <typename Info>
-  void note(const Info& info) {
-    auto& names = names_[id_of(info.gid_.data_)];
+  void note(const auto& info) {
+    auto& names = names_[id_of(info.gid.data)];
     names.clear();
-    for (std::uint32_t i = 0; i < info.node_entities_info_seq_._length; ++i) {
-      const auto& node = info.node_entities_info_seq_._buffer[i];
-      std::string name = node.node_namespace_;
+    for (std::uint32_t i = 0; i < info.node_entities_info_seq._length; ++i) {
+      const auto& node = info.node_entities_info_seq._buffer[i];
+      std::string name = node.node_namespace;
       if (!name.ends_with('/')) name += '/';
-      name += node.node_name_;
-      for (std::uint32_t k = 0; k < node.reader_gid_seq_._length; ++k)
-        names[id_of(node.reader_gid_seq_._buffer[k].data_)] = name;
+      name += node.node_name;
+      for (std::uint32_t k = 0; k < node.reader_gid_seq._length; ++k)
+        names[id_of(node.reader_gid_seq._buffer[k].data)] = name;
     }
   }
 
@@ -319,27 +305,17 @@ std::map<std::string, std::string> DdsNode::published() const {
   const dds_entity_t reader =
       checked(dds_create_reader(participant_, DDS_BUILTIN_TOPIC_DCPSPUBLICATION, nullptr, nullptr), "reader");
   std::map<std::string, std::string> published;
-  constexpr int at_once = 64;
-  std::array<void*, at_once> samples{};
-  std::array<dds_sample_info_t, at_once> infos;
-  for (int count; (count = dds_take(reader, samples.data(), infos.data(), at_once, at_once)) > 0;) {
-    for (int i = 0; i < count; ++i) {
-      const auto& writer = *static_cast<const dds_builtintopic_endpoint_t*>(samples[i]);
-      if (!infos[i].valid_data || std::memcmp(writer.participant_key.v, own.v, sizeof own.v) == 0) continue;
-      if (const auto topic = ros2_topic_name(writer.topic_name)) published[*topic] = ros2_type_name(writer.type_name);
-    }
-    dds_return_loan(reader, samples.data(), count);
-  }
+  take_all<dds_builtintopic_endpoint_t>(reader, [&](const dds_builtintopic_endpoint_t& writer) {
+    if (std::memcmp(writer.participant_key.v, own.v, sizeof own.v) == 0) return;
+    if (const auto topic = ros2_topic_name(writer.topic_name)) published[*topic] = ros2_type_name(writer.type_name);
+  });
   dds_delete(reader);
   return published;
 }
 
 void DdsNode::announce() {
-  if (wide_gids_) {
-    WideAnnounced(name_, participant_, readers_, writers_).write(discovery_);
-  } else {
-    Announced(name_, participant_, readers_, writers_).write(discovery_);
-  }
+  const auto write = wide_gids_ ? write_announcement<WideInfo> : write_announcement<Info>;
+  write(discovery_, name_, participant_, readers_, writers_);
 }
 
 }  // namespace lapservo::internal

@@ -5,6 +5,7 @@
 #include <ifaddrs.h>
 #include <memory>
 #include <net/if.h>
+#include <sstream>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -29,13 +30,11 @@ bool is_host(const std::string& text) {
 
 std::vector<std::string> hosts_of(const std::string& text) {
   std::vector<std::string> hosts;
-  for (std::size_t begin = 0; begin < text.size();) {
-    const std::size_t end = std::min(text.find(';', begin), text.size());
-    const std::string host = text.substr(begin, end - begin);
+  std::istringstream list(text);
+  for (std::string host; std::getline(list, host, ';');) {
     if (!is_host(host))
       throw InputError("ROS_STATIC_PEERS", "holds " + host + ", expected hosts or addresses between ;");
     if (!host.empty()) hosts.push_back(host);
-    begin = end + 1;
   }
   return hosts;
 }

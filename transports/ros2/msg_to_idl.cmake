@@ -1,6 +1,7 @@
-# Writes the IDL of ROS 2 messages as ROS 2's DDS layers see them: type pkg/Name is pkg::msg::dds_::Name_, members end in
-# an underscore, all is final. MSG: the folder of pkg/msg/Name.msg; TYPES: pkg/Name, each after those that it holds; OUT: the
-# IDL. Constants and default values are not on the wire.
+# Writes the IDL of ROS 2 messages as ROS 2's DDS layers see them: type pkg/Name is pkg::msg::dds_::Name_, all is final.
+# Members, whose names are not on the wire, are called as in ROS: the underscore before them tells IDL that they are no
+# keywords. MSG: the folder of pkg/msg/Name.msg; TYPES: pkg/Name, each after those that it holds; OUT: the IDL. Constants
+# and default values are not on the wire.
 cmake_minimum_required(VERSION 3.25)
 
 set(idl_of_bool boolean)
@@ -32,7 +33,7 @@ function(member line package result)
   if(NOT line MATCHES "^([^ []+)(\\[([0-9]*)\\])? ([a-z0-9_]+)$")
     message(FATAL_ERROR "${package}: can't read '${line}'")
   endif()
-  set(name ${CMAKE_MATCH_4}_)
+  set(name _${CMAKE_MATCH_4})
   set(brackets "${CMAKE_MATCH_2}")
   set(size "${CMAKE_MATCH_3}")
   element_type("${CMAKE_MATCH_1}" ${package} type)

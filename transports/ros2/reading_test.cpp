@@ -25,17 +25,11 @@ OperatingStateMessage state(int number) {
 StringMessage text(int number) {
   return {0, std::to_string(number)};
 }
-TrajectoryMessage trajectory(int number) {
-  return {0, {std::to_string(number)}, {}};
-}
 int number_of(const OperatingStateMessage& message) {
   return std::stoi(message.state);
 }
 int number_of(const StringMessage& message) {
   return std::stoi(message.text);
-}
-int number_of(const TrajectoryMessage& message) {
-  return std::stoi(message.names.at(0));
 }
 
 template <typename Message>
@@ -73,15 +67,10 @@ void expect_order(Delivery offered, Message (*numbered)(int)) {
   EXPECT_EQ(numbers_of(heard), range(1, bursts * 7 / 2)) << static_cast<int>(offered);
 }
 
-TEST(Reading, StatesComeOnceInTheirOrderByWhateverTheirPublisherOffers) {
-  for (const Delivery offered : {Delivery::latched, Delivery::reliable, Delivery::best_effort})
-    expect_order(offered, state);
-}
-
-TEST(Reading, CommandsAndTrajectoriesComeOnceInTheirOrderByWhateverTheirPublisherOffers) {
+TEST(Reading, StatesAndCommandsComeOnceInTheirOrderByWhateverTheirPublisherOffers) {
   for (const Delivery offered : {Delivery::latched, Delivery::reliable, Delivery::best_effort}) {
+    expect_order(offered, state);
     expect_order(offered, text);
-    expect_order(offered, trajectory);
   }
 }
 

@@ -22,7 +22,6 @@ class Ros2Transport : public Transport {
   Subscription subscribe_commands(const std::string& topic, CommandType type, Handler<CommandMessage> handler) override;
   std::set<std::string> readers(const std::string& topic) const override;
   std::map<std::string, std::string> published() const override;
-  double stamp_now_s() const override;
 
  private:
   void open(const std::string& topic, AnyPublisher& publisher) override;

@@ -242,8 +242,8 @@ TEST(Ros2Transport, CommandsAreHeardWhateverTheSendersClockSays) {
   static char text[] = "stop";
   static char no_frame[] = "";
   crtk_msgs_msg_dds__StringStamped_ stop{};
-  stop.header_.frame_id_ = no_frame;
-  stop.string_ = text;
+  stop.header.frame_id = no_frame;
+  stop.string = text;
   dds_time_t now = dds_time();
   const auto say = [&] { dds_write_ts(writer, &stop, now); };
   commands.get(say);
@@ -283,9 +283,9 @@ TEST(Ros2Transport, WhatItTellsOfTheLoopArrivesAsItsType) {
 
 TEST(Ros2Transport, AStampThatIsNoneIsNotANumber) {
   sensor_msgs_msg_dds__JointState_ wire{};
-  wire.header_.stamp_ = {5, 1000000000u};
+  wire.header.stamp = {5, 1000000000u};
   EXPECT_TRUE(std::isnan(Wire<JointMessage>::read(wire).stamp_s));
-  wire.header_.stamp_ = {5, 999999999u};
+  wire.header.stamp = {5, 999999999u};
   EXPECT_NEAR(Wire<JointMessage>::read(wire).stamp_s, 6, 1e-8);
 }
 

@@ -1,15 +1,23 @@
 #include "apps/lapservo/cli/command.h"
 
 #include <algorithm>
+#include <csignal>
 #include <cstdint>
 #include <cstdio>
+#include <cstdlib>
+#include <exception>
+#include <fcntl.h>
+#include <filesystem>
 #include <limits>
 #include <optional>
+#include <unistd.h>
 #include <utility>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
+#include <opencv2/core/utils/logger.hpp>
 
+#include "apps/lapservo/cli/interrupt.h"
 #include "lapservo/core/csv.h"
 #include "lapservo/core/error.h"
 #include "lapservo/core/nearest_word.h"
@@ -18,6 +26,7 @@ namespace lapservo::app {
 using namespace internal;
 namespace {
 
+constexpr int bad_input = 2;                   // the exit code
 constexpr double max_seed = 9007199254740991;  // 2^53 - 1: whole in a double too
 
 // To be the option's first check.
@@ -29,6 +38,12 @@ CLI::Validator checked(const std::string& expected, bool whole, double low, doub
     return good ? std::string() : fmt::format("is {}, expected {}", text.empty() ? "empty" : text, expected);
   };
   return CLI::Validator(problem, "", "number");
+}
+
+Rule number_between(const std::string& kind, bool whole, double low, double high) {
+  const std::string range = fmt::format("{} to {}", low, high);
+  return
+      [=](CLI::Option& option) { option.check(checked(kind + " of " + range, whole, low, high).description(range)); };
 }
 
 // The first word of a command line that is no command or option, with the nearest that is one: "; trak is unknown, the
@@ -55,47 +70,46 @@ std::string suggestion(const CLI::App& program, int argc, char** argv) {
 
 }  // namespace
 
-Option& Option::required() {
-  option_->required();
-  return *this;
+Rule required(const Rule& rule) {
+  return [=](CLI::Option& option) {
+    if (rule) rule(option);
+    option.required();
+  };
 }
 
-Option& Option::without_value(const std::string& meant) {
-  option_->expected(0, 1)->default_str(meant);
-  return *this;
+Rule without_value(const std::string& meant, const Rule& rule) {
+  return [=](CLI::Option& option) {
+    rule(option);
+    option.expected(0, 1)->default_str(meant);
+  };
 }
 
-Option& Option::one_of(const std::vector<std::string>& words) {
-  option_->check(CLI::IsMember(words));
-  return *this;
+Rule one_of(const std::vector<std::string>& words) {
+  return [=](CLI::Option& option) { option.check(CLI::IsMember(words)); };
 }
 
-Option& Option::number_between(double low, double high) {
-  option_->check(checked(fmt::format("a number of {} to {}", low, high), false, low, high)
-                     .description(fmt::format("{} to {}", low, high)));
-  return *this;
+Rule between(double low, double high) {
+  return number_between("a number", false, low, high);
 }
 
-Option& Option::whole_number_between(double low, double high) {
-  option_->check(checked(fmt::format("a whole number of {} to {}", low, high), true, low, high)
-                     .description(fmt::format("{} to {}", low, high)));
-  return *this;
+Rule whole_between(double low, double high) {
+  return number_between("a whole number", true, low, high);
 }
 
-Option& Option::finite_numbers(std::optional<int> count) {
-  constexpr double any = std::numeric_limits<double>::max();
-  option_->check(checked("a finite number", false, -any, any))->delimiter(',');
-  if (count) option_->expected(*count);
-  return *this;
+Rule finite_numbers(std::optional<int> count) {
+  return [=](CLI::Option& option) {
+    constexpr double any = std::numeric_limits<double>::max();
+    option.check(checked("a finite number", false, -any, any))->delimiter(',');
+    if (count) option.expected(*count);
+  };
 }
 
-Option& Option::seed_number() {
-  option_->check(checked("a whole number from 0 to 2^53 - 1", true, 0, max_seed));
-  return *this;
+Rule seed_number() {
+  return [](CLI::Option& option) { option.check(checked("a whole number from 0 to 2^53 - 1", true, 0, max_seed)); };
 }
 
 Command Command::add_subcommand(const std::string& name, const std::string& about) {
-  return Command(app_->add_subcommand(name, about));
+  return {app_->add_subcommand(name, about), chosen_};
 }
 
 void Command::require_subcommand() {
@@ -103,20 +117,20 @@ void Command::require_subcommand() {
 }
 
 template <typename Value>
-Option Command::add_option(const std::string& names, Value& value, const std::string& help) {
+void Command::add_option(const std::string& names, Value& value, const Rule& rule, const std::string& help) {
   CLI::Option* option = app_->add_option(names, value, help)->capture_default_str();
   if (option->get_default_str() == "[]") option->default_str("");
-  return Option(option);
+  if (rule) rule(*option);
 }
 
-template Option Command::add_option(const std::string&, double&, const std::string&);
-template Option Command::add_option(const std::string&, int&, const std::string&);
-template Option Command::add_option(const std::string&, std::uint64_t&, const std::string&);
-template Option Command::add_option(const std::string&, std::string&, const std::string&);
-template Option Command::add_option(const std::string&, std::optional<double>&, const std::string&);
-template Option Command::add_option(const std::string&, std::optional<int>&, const std::string&);
-template Option Command::add_option(const std::string&, std::vector<double>&, const std::string&);
-template Option Command::add_option(const std::string&, std::vector<std::string>&, const std::string&);
+template void Command::add_option(const std::string&, double&, const Rule&, const std::string&);
+template void Command::add_option(const std::string&, int&, const Rule&, const std::string&);
+template void Command::add_option(const std::string&, std::uint64_t&, const Rule&, const std::string&);
+template void Command::add_option(const std::string&, std::string&, const Rule&, const std::string&);
+template void Command::add_option(const std::string&, std::optional<double>&, const Rule&, const std::string&);
+template void Command::add_option(const std::string&, std::optional<int>&, const Rule&, const std::string&);
+template void Command::add_option(const std::string&, std::vector<double>&, const Rule&, const std::string&);
+template void Command::add_option(const std::string&, std::vector<std::string>&, const Rule&, const std::string&);
 
 void Command::add_flag(const std::string& names, bool& value, const std::string& help) {
   app_->add_flag(names, value, help);
@@ -138,19 +152,43 @@ void Command::refuse(const std::vector<std::string>& names, const std::string& w
     if (std::find(names.begin(), names.end(), name) != names.end()) throw InputError(name, why);
 }
 
-void Command::runs(Run& run_later, Run run) {
-  app_->callback([&run_later, run = std::move(run)] { run_later = run; });
+void Command::runs(Run run) {
+  app_->callback([&chosen = chosen_, run = std::move(run)] { chosen = run; });
 }
 
-int run_subcommand(int argc, char** argv, const std::string& version, const std::vector<AddSubcommand>& subcommands) {
+namespace {
+
+// The libraries beneath print their own complaints; ours is one line that names the file.
+void silence_libraries() {
+  cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
+  setenv("GST_DEBUG", "none", 0);
+}
+
+// A closed one would give its number to a result's file, and our messages would go there. A limit on files' sizes is an
+// error like a full disk, which is reported, and not the end.
+void prepare_standard_streams() {
+  for (const int number : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
+    if (::fcntl(number, F_GETFD) == -1 && ::open("/dev/null", O_RDWR) != number) std::abort();
+  std::signal(SIGXFSZ, SIG_IGN);
+}
+
+// The printed part may be the wanted one.
+int flushed(int exit_code) {
+  if (std::fflush(stdout) == 0 && !std::ferror(stdout)) return exit_code;
+  std::fprintf(stderr, "lapservo: standard output: could not be written to its end\n");
+  return bad_input;
+}
+
+int run_subcommand(int argc, char** argv, const std::vector<AddSubcommand>& subcommands) {
   CLI::App app{"See and steer a laparoscopic instrument by its camera.", "lapservo"};
-  app.set_version_flag("--version", "lapservo " + version);
+  app.set_version_flag("--version", "lapservo " LAPSERVO_VERSION);
   app.require_subcommand(1);
   app.footer(
       "`lapservo SUBCOMMAND --help` shows its options and an example.\n"
       "Exit codes: 0 done, 1 found nothing or did not converge, 2 bad input.");
   Run run;
-  for (const AddSubcommand add : subcommands) add(Command(&app), run);
+  const Command program(&app, run);
+  for (const AddSubcommand add : subcommands) add(program);
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& help) {
@@ -160,6 +198,23 @@ int run_subcommand(int argc, char** argv, const std::string& version, const std:
     return bad_input;
   }
   return run();
+}
+
+}  // namespace
+
+int run_program(int argc, char** argv, const std::vector<AddSubcommand>& subcommands) {
+  silence_libraries();
+  prepare_standard_streams();
+  try {
+    return flushed(run_subcommand(argc, argv, subcommands));
+  } catch (const std::filesystem::filesystem_error& error) {
+    std::fprintf(stderr, "lapservo: %s: can't be used (%s), expected a name that can\n", error.path1().c_str(),
+                 error.code().message().c_str());
+    return bad_input;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "lapservo: %s\n", error.what());
+    return interrupted() ? 1 : bad_input;
+  }
 }
 
 }  // namespace lapservo::app

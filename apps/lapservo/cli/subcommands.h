@@ -4,25 +4,25 @@
 
 namespace lapservo::app {
 
-// Each adds its subcommand (one file each) and, when the command line names it, sets `run`.
-void add_align(Command app, Run& run);
-void add_calibrate(Command app, Run& run);
-void add_calibrate_all(Command calibrate, Run& run);
-void add_calibrate_camera(Command calibrate, Run& run);
-void add_calibrate_colour(Command calibrate, Run& run);
-void add_calibrate_marker(Command calibrate, Run& run);
-void add_calibrate_registration(Command calibrate, Run& run);
-void add_calibrate_tip(Command calibrate, Run& run);
-void add_check(Command app, Run& run);
-void add_estimate_rcm(Command app, Run& run);
-void add_experiment(Command app, Run& run);
-void add_marker(Command app, Run& run);
-void add_record(Command app, Run& run);
-void add_render(Command app, Run& run);
-void add_sample(Command app, Run& run);
-void add_servo(Command app, Run& run);
-void add_sim_robot(Command app, Run& run);
-void add_track(Command app, Run& run);
-void add_view(Command app, Run& run);
+// Each adds its subcommand (one file each).
+void add_align(Command app);
+void add_calibrate(Command app);
+void add_calibrate_all(Command calibrate);
+void add_calibrate_camera(Command calibrate);
+void add_calibrate_colour(Command calibrate);
+void add_calibrate_marker(Command calibrate);
+void add_calibrate_registration(Command calibrate);
+void add_calibrate_tip(Command calibrate);
+void add_check(Command app);
+void add_estimate_rcm(Command app);
+void add_experiment(Command app);
+void add_marker(Command app);
+void add_record(Command app);
+void add_render(Command app);
+void add_sample(Command app);
+void add_servo(Command app);
+void add_sim_robot(Command app);
+void add_track(Command app);
+void add_view(Command app);
 
 }  // namespace lapservo::app

@@ -17,28 +17,25 @@ struct WebOptions {
   /// Throws InputError for --listen without --web.
   void check() const;
 };
-/// --web and --listen.
-void add_web_options(Command command, WebOptions& options);
-/// The same, where the page is what the command is for.
-void add_page_options(Command command, WebOptions& options);
+/// --web and --listen. `page_only`: the page is what the command is for.
+void add_web_options(Command command, WebOptions& options, bool page_only = false);
 
-/// The page of --web and `lapservo view`, whose address is printed.
-class WebView {
- public:
-  /// `config`: what the page is of; the rest is the options'. Throws InputError where it can't be served, and in a
-  /// build without it.
-  WebView(const WebOptions& options, internal::PageConfig config);
-
-  // See internal::LivePage.
-  long show(internal::PageImage image);
-  void tell(const internal::PageLoop& loop, const std::string& state);
-  void end();
-  bool was_watched() const;
-  internal::PageWishes wishes();
-  bool operator_present();
-
- private:
-  std::shared_ptr<internal::LivePage> page_;  // shared: a build without it has no destructor for it
+#ifdef LAPSERVO_WEB
+using WebView = internal::LivePage;
+#else
+/// In a build without the page: never made.
+struct WebView {
+  long show(const internal::PageImage&) { return 0; }
+  void tell(const internal::PageLoop&, const std::string&) {}
+  void end() {}
+  bool was_watched() const { return false; }
+  internal::PageWishes take_wishes() { return {}; }
+  bool operator_present() { return false; }
 };
+#endif
+
+/// The page of --web and `lapservo view`, whose address is printed. `config`: what the page is of; the rest is the
+/// options'. Throws InputError where it can't be served, and in a build without it.
+std::unique_ptr<WebView> open_page(const WebOptions& options, internal::PageConfig config);
 
 }  // namespace lapservo::app

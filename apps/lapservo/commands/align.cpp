@@ -1,5 +1,4 @@
 #include <cstdio>
-#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -11,12 +10,12 @@
 #include "apps/lapservo/commands/calibrate/calibrate_inputs.h"
 #include "apps/lapservo/inputs/frame_input.h"
 #include "apps/lapservo/inputs/joint_input.h"
-#include "lapservo/calibration/fit/some_of.h"
 #include "lapservo/calibration/registration/alignment.h"
 #include "lapservo/calibration/registration/registration_measurement.h"
 #include "lapservo/core/atomic_file.h"
 #include "lapservo/core/error.h"
 #include "lapservo/core/rounded_sigma.h"
+#include "lapservo/core/statistics.h"
 #include "lapservo/report/html_report.h"
 
 namespace lapservo::app {
@@ -63,7 +62,7 @@ void write_page(const std::string& path, const std::string& input, const Alignme
 
 int run(const CalibrateOptions& options) {
   Rig rig = load_rig(options.rig);
-  const std::size_t index = instrument_meant(rig, options);
+  const std::size_t index = instrument_meant(rig, options.instrument, options.rig);
   Instrument instrument = rig.instruments[index];
   refuse_outputs_over_inputs(options, rig);
   const auto frames = open_frames(options.input, options, &rig.camera);
@@ -74,16 +73,12 @@ int run(const CalibrateOptions& options) {
   if (!options.out.empty()) out.emplace(options.out);
   watch_for_interrupts();
 
-  const auto refuse = [&](const std::string& why) {
-    std::fprintf(stderr, "lapservo: %s: %s\n", options.input.c_str(), why.c_str());
-    return 1;
-  };
   const MeasuredPoses poses = poses_in_frames(rig, index, {*frames, options.input, options.deinterlace}, watched_job());
-  if (poses.read.stopped) return refuse("stopped");
+  if (poses.read.stopped) return refuse(options.input, "stopped");
   say_complaint(options.input, poses.read.complaint);
-  if (!poses.none.empty()) return refuse(poses.none);
+  if (!poses.none.empty()) return refuse(options.input, poses.none);
   const Alignment found = align(instrument, poses.all, joints->recording, joints->source);
-  if (!found.refusal.empty()) return refuse(found.refusal);
+  if (!found.refusal.empty()) return refuse(options.input, found.refusal);
   std::printf("%s\n%s\n", offset_text(found).c_str(), drift_text(found).c_str());
   if (!options.report.empty()) write_page(options.report, options.input, found, instrument.joints.value());
   if (!out) {
@@ -98,28 +93,24 @@ int run(const CalibrateOptions& options) {
 
 }  // namespace
 
-void add_align(Command app, Run& run_later) {
-  auto options = std::make_shared<CalibrateOptions>();
-  Command command = app.add_subcommand(
-      "align", "Measure the time between a video of the marker and a recording of the joints that began apart.");
-  command
-      .add_option("input", options->input,
-                  "The marker in motion: a folder, a video or a bag, of which the joints show a part at least")
-      .required();
-  command.add_option("--rig", options->rig, "Camera and marker; where the arm stands need not be known").required();
-  add_joint_options(command, *options,
+void add_align(Command app) {
+  auto [command, options] = app.add_subcommand<CalibrateOptions>(
+      "align", "Measure the time between a video of the marker and a recording of the joints that began apart.", run);
+  command.add_option("input", options.input, required(),
+                     "The marker in motion: a folder, a video or a bag, of which the joints show a part at least");
+  command.add_option("--rig", options.rig, required(), "Camera and marker; where the arm stands need not be known");
+  add_joint_options(command, options,
                     "CSV of the arm's joints (time_s and a column a joint, named as in the rig's joints), or a bag; "
                     "without it those in the input, where it is a bag");
-  add_recording_options(command, *options);
-  command.add_option("--out", options->out,
+  add_recording_options(command, options);
+  command.add_option("--out", options.out,
                      "The rig to write or replace, with the offset as image_delay_s; may be --rig's");
-  command.add_option("--report", options->report, "HTML page with the curves of both, one over the other");
+  command.add_option("--report", options.report, "HTML page with the curves of both, one over the other");
   command.footer(
       "The clocks may differ by up to 30 s, beyond the image_delay_s that the rig has. All four joints have to move, "
       "for\n"
       "10 s or more of what both show, and not periodically. Exit code 1: no offset, or several that fit.\n"
       "Example:\n  lapservo align video.mp4 --joints joints.csv --rig rig.yaml --out rig.yaml --report align.html");
-  command.runs(run_later, [options] { return run(*options); });
 }
 
 }  // namespace lapservo::app

@@ -3,7 +3,6 @@
 #include <cstdio>
 #include <cstdlib>
 #include <future>
-#include <memory>
 #include <optional>
 #include <string>
 #include <unistd.h>
@@ -16,7 +15,7 @@
 #include "apps/lapservo/cli/interrupt.h"
 #include "apps/lapservo/cli/progress.h"
 #include "apps/lapservo/cli/subcommands.h"
-#include "apps/lapservo/commands/calibrate/calibrate_steps.h"
+#include "apps/lapservo/commands/calibrate/calibrate_inputs.h"
 #include "apps/lapservo/commands/check_report.h"
 #include "apps/lapservo/inputs/frame_input.h"
 #include "apps/lapservo/inputs/joint_input.h"
@@ -73,7 +72,7 @@ std::string tip_text(const Instrument& instrument, const std::vector<FrameEviden
 
 int check(const CalibrateOptions& options) {
   const Rig rig = load_rig(options.rig);
-  const std::size_t index = instrument_meant(rig, options);
+  const std::size_t index = instrument_meant(rig, options.instrument, options.rig);
   Instrument instrument = rig.instruments[index];
   refuse_outputs_over_inputs(options, rig);
   const auto source = open_frames(options.input, options, &rig.camera);
@@ -93,10 +92,7 @@ int check(const CalibrateOptions& options) {
                                         (found ? seen : missed) = bgr, count += found;
                                         return fmt::format(", {} in {}", instrument.name, count);
                                       });
-  if (read.stopped) {
-    std::fprintf(stderr, "lapservo: %s: stopped\n", options.input.c_str());
-    return 1;
-  }
+  if (read.stopped) return refuse(options.input, "stopped");
   say_complaint(options.input, read.complaint);
   CheckedRig checked;
   {
@@ -141,23 +137,22 @@ int check(const CalibrateOptions& options) {
   return checked.good_enough() ? 0 : 1;
 }
 
-void add_check(Command app, Run& run_later) {
-  auto options = std::make_shared<CalibrateOptions>();
-  Command command = app.add_subcommand("check", "Check whether a rig is good enough, and what to improve first.");
-  command.add_option("input", options->input, "A short recording of the marker in motion: a folder, a video or a bag")
-      .required();
-  command.add_option("--rig", options->rig, "The rig to check").required();
+void add_check(Command app) {
+  auto [command, options] = app.add_subcommand<CalibrateOptions>(
+      "check", "Check whether a rig is good enough, and what to improve first.", check);
+  command.add_option("input", options.input, required(),
+                     "A short recording of the marker in motion: a folder, a video or a bag");
+  command.add_option("--rig", options.rig, required(), "The rig to check");
   add_joint_options(
-      command, *options,
+      command, options,
       "CSV of the arm's joints meanwhile (time_s and a column a joint, named as in the rig's joints), or a bag; "
       "without it those in the input, where it is a bag: registration, delay, focal length and drift too");
-  add_recording_options(command, *options);
-  command.add_option("--out", options->report, "HTML page with figures");
+  add_recording_options(command, options);
+  command.add_option("--out", options.report, "HTML page with figures");
   command.footer(
       "Swing, insert and withdraw the instrument, and turn it about its axis once, in 10 to 60 s, the marker in view.\n"
       "Exit code 0: good enough, 1: not good enough.\n"
       "Example:\n  lapservo check swing.mp4 --joints joints.csv --rig rig.yaml --out check.html");
-  command.runs(run_later, [options] { return check(*options); });
 }
 
 }  // namespace lapservo::app

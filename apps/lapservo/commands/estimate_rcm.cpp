@@ -4,7 +4,6 @@
 #include <cstdio>
 #include <filesystem>
 #include <map>
-#include <memory>
 #include <optional>
 #include <ostream>
 #include <string>
@@ -26,7 +25,7 @@
 #include "lapservo/rcm/line_observation.h"
 #include "lapservo/rcm/pairwise_mean.h"
 #include "lapservo/rcm/projected_rcm.h"
-#include "lapservo/rig/instrument_index.h"
+#include "lapservo/rig/instruments.h"
 #include "lapservo/rig/rig.h"
 
 namespace lapservo::app {
@@ -42,14 +41,12 @@ struct EstimateRcmOptions {
 
 // An estimate of where an instrument's RCM appears in the image, in ideal pixels, by one of two methods.
 struct RcmResult {
-  std::string instrument, method, status;  ///< `method`: weighted or pairwise; `status`: RcmStatus's word
-  std::size_t lines = 0, outliers = 0;
-  std::optional<Eigen::Vector2d> point_px;  ///< empty unless `status` is ok
-  std::optional<Eigen::Matrix2d> covariance_px2;
+  std::string instrument, method;  ///< `method`: weighted or pairwise
+  RcmEstimate estimate;            ///< of the pairwise mean: status, lines, point and covariance
   std::optional<double> noise_px, chi2, spread_rad;
-  bool near_parallel = false;
-  std::vector<std::string> faults;        ///< RcmEstimate::faults
   std::optional<Eigen::Vector2d> rig_px;  ///< the RCM by the rig's camera_from_rcm
+
+  bool is_ok() const { return estimate.status == RcmStatus::ok; }
 };
 
 using LinesByInstrument = std::map<std::string, std::vector<LineObservation>>;
@@ -97,20 +94,15 @@ LinesByInstrument read_lines(const EstimateRcmOptions& options, const std::optio
 // residuals; `common_px`: an error that all lines share.
 RcmResult weighted_result(const std::vector<LineObservation>& lines, double sigma_px, double common_px) {
   const bool known = sigma_px > 0;
-  const RcmEstimate estimate =
-      estimate_projected_rcm(lines, {known ? NoiseScale::known : NoiseScale::estimated, common_px});
   RcmResult result;
   result.method = "weighted";
-  result.status = to_string(estimate.status);
-  result.lines = estimate.lines, result.outliers = estimate.outliers;
-  if (estimate.status != RcmStatus::ok) return result;
-  result.point_px = estimate.point_px;
-  result.covariance_px2 = estimate.covariance_px2;
-  result.chi2 = known ? std::optional(estimate.chi2) : std::nullopt;
+  RcmEstimate& estimate = result.estimate;
+  estimate = estimate_projected_rcm(lines, {known ? NoiseScale::known : NoiseScale::estimated, common_px});
+  if (!result.is_ok()) return result;
+  if (known) result.chi2 = estimate.chi2;
   if (estimate.degrees_of_freedom > 0)
     result.noise_px = (known ? sigma_px : 1) * std::sqrt(estimate.chi2 / estimate.degrees_of_freedom);
   result.spread_rad = estimate.direction_spread_rad;
-  result.near_parallel = estimate.near_parallel, result.faults = estimate.faults;
   return result;
 }
 
@@ -118,13 +110,12 @@ RcmResult weighted_result(const std::vector<LineObservation>& lines, double sigm
 RcmResult pairwise_result(const std::vector<LineObservation>& lines, const RcmResult& weighted) {
   RcmResult result;
   result.method = "pairwise";
-  result.lines = static_cast<std::size_t>(std::count_if(lines.begin(), lines.end(), is_usable));
-  const bool parallel = weighted.status == to_string(RcmStatus::parallel);
+  RcmEstimate& estimate = result.estimate;
+  estimate.lines = static_cast<std::size_t>(std::count_if(lines.begin(), lines.end(), is_usable));
+  const bool parallel = weighted.estimate.status == RcmStatus::parallel;
   const auto mean = parallel ? std::nullopt : mean_of_intersections(lines);
-  result.status = to_string(mean ? RcmStatus::ok : result.lines < 2 ? RcmStatus::too_few_lines : RcmStatus::parallel);
-  if (!mean) return result;
-  result.point_px = mean->point_px;
-  result.covariance_px2 = mean->covariance_px2;
+  estimate.status = mean ? RcmStatus::ok : estimate.lines < 2 ? RcmStatus::too_few_lines : RcmStatus::parallel;
+  if (mean) estimate.point_px = mean->point_px, estimate.covariance_px2 = mean->covariance_px2;
   return result;
 }
 
@@ -137,24 +128,28 @@ void write_rcm_results(std::ostream& out, const std::vector<RcmResult>& results)
   out << "instrument,method,status,lines,outliers,rcm_u_px,rcm_v_px,sigma_u_px,sigma_v_px,correlation,noise_px,"
          "chi2,direction_spread_rad,near_parallel,rig_u_px,rig_v_px,distance_px\n";
   for (const RcmResult& r : results) {
+    const RcmEstimate& e = r.estimate;
+    const auto point = r.is_ok() ? std::optional(e.point_px) : std::nullopt;
+    const auto covariance = r.is_ok() ? e.covariance_px2 : std::nullopt;
     const auto of = [](const auto& optional, auto get) {
       return optional ? std::optional<double>(get(*optional)) : std::nullopt;
     };
     const auto sigma = [&](Eigen::Index i) {
-      return of(r.covariance_px2, [&](const Eigen::Matrix2d& c) { return std::sqrt(c(i, i)); });
+      return of(covariance, [&](const Eigen::Matrix2d& c) { return std::sqrt(c(i, i)); });
     };
     const auto u = [](const Eigen::Vector2d& p) { return p.x(); };
     const auto v = [](const Eigen::Vector2d& p) { return p.y(); };
-    std::string row = fmt::format("{},{},{},{},{}", csv_field(r.instrument), r.method, r.status, r.lines, r.outliers);
+    std::string row =
+        fmt::format("{},{},{},{},{}", csv_field(r.instrument), r.method, to_string(e.status), e.lines, e.outliers);
     const auto correlation = [](const Eigen::Matrix2d& c) {
       const double scale = std::sqrt(c(0, 0) * c(1, 1));
       return scale > 0 ? c(0, 1) / scale : 0;
     };
-    const auto distance = r.point_px && r.rig_px ? std::optional((*r.point_px - *r.rig_px).norm()) : std::nullopt;
-    for (const auto& value : {of(r.point_px, u), of(r.point_px, v), sigma(0), sigma(1),
-                              of(r.covariance_px2, correlation), r.noise_px, r.chi2, r.spread_rad})
+    const auto distance = point && r.rig_px ? std::optional((*point - *r.rig_px).norm()) : std::nullopt;
+    for (const auto& value : {of(point, u), of(point, v), sigma(0), sigma(1), of(covariance, correlation), r.noise_px,
+                              r.chi2, r.spread_rad})
       row += "," + number_or_empty(value);
-    row += r.near_parallel ? ",1" : ",0";
+    row += r.is_ok() && e.near_parallel ? ",1" : ",0";
     for (const auto& value : {of(r.rig_px, u), of(r.rig_px, v), distance}) row += "," + number_or_empty(value);
     out << row << '\n';
   }
@@ -180,39 +175,40 @@ std::vector<RcmResult> estimate_all(const EstimateRcmOptions& options, const std
 }
 
 void print(const RcmResult& r) {
+  const RcmEstimate& e = r.estimate;
   const std::string head = fmt::format("{} {:<9}", r.instrument, r.method + ":");
-  if (!r.point_px) {
-    const char* why = r.status == "parallel" ? ": turn the instrument farther between frames" : "";
-    std::printf("%s none (%s, %zu lines%s)\n", head.c_str(), r.status.c_str(), r.lines, why);
+  if (!r.is_ok()) {
+    const char* why = e.status == RcmStatus::parallel ? ": turn the instrument farther between frames" : "";
+    std::printf("%s none (%s, %zu lines%s)\n", head.c_str(), std::string(to_string(e.status)).c_str(), e.lines, why);
     return;
   }
-  std::string line = fmt::format("({:.2f}, {:.2f}) px", r.point_px->x(), r.point_px->y());
-  line += r.covariance_px2 ? fmt::format(", sigma ({:.2f}, {:.2f}) px", std::sqrt((*r.covariance_px2)(0, 0)),
-                                         std::sqrt((*r.covariance_px2)(1, 1)))
+  std::string line = fmt::format("({:.2f}, {:.2f}) px", e.point_px.x(), e.point_px.y());
+  line += e.covariance_px2 ? fmt::format(", sigma ({:.2f}, {:.2f}) px", std::sqrt((*e.covariance_px2)(0, 0)),
+                                         std::sqrt((*e.covariance_px2)(1, 1)))
                            : std::string(", sigma unknown");
-  line += fmt::format(", {} lines", r.lines);
-  if (r.method == "weighted") line += fmt::format(", {} of them outliers", r.outliers);
+  line += fmt::format(", {} lines", e.lines);
+  if (r.method == "weighted") line += fmt::format(", {} of them outliers", e.outliers);
   if (r.noise_px) line += fmt::format(", noise {:.3f} px", *r.noise_px);
-  if (r.chi2) line += fmt::format(", chi2 {:.1f} of {}", *r.chi2, r.lines - r.outliers - 2);
-  if (r.rig_px) line += fmt::format("; {:.2f} px from the rig's", (*r.point_px - *r.rig_px).norm());
+  if (r.chi2) line += fmt::format(", chi2 {:.1f} of {}", *r.chi2, e.lines - e.outliers - 2);
+  if (r.rig_px) line += fmt::format("; {:.2f} px from the rig's", (e.point_px - *r.rig_px).norm());
   std::printf("%s %s\n", head.c_str(), line.c_str());
-  for (const std::string& fault : r.faults)
+  for (const std::string& fault : e.faults)
     std::printf("%s: beyond the noise, counted in sigma: %s\n", r.instrument.c_str(), fault.c_str());
 }
 
 // Warns of lines that make the numbers unreliable.
 void warn(const RcmResult& r) {
   constexpr double implausibly_small_px = 0.005;
-  if (r.near_parallel)
+  if (r.is_ok() && r.estimate.near_parallel)
     std::fprintf(stderr,
                  "lapservo: warning: %s: the lines are nearly parallel (their directions spread by %.1f degrees): the "
                  "estimate is poor along them; turn the instrument farther\n",
                  r.instrument.c_str(), r.spread_rad.value_or(0) * 180 / pi);
-  if (3 * r.outliers > r.lines)
+  if (3 * r.estimate.outliers > r.estimate.lines)
     std::fprintf(stderr,
                  "lapservo: warning: %s: %zu of %zu lines don't fit: --sigma-px is too small, or something else moved "
                  "(the port, the camera)\n",
-                 r.instrument.c_str(), r.outliers, r.lines);
+                 r.instrument.c_str(), r.estimate.outliers, r.estimate.lines);
   if (r.noise_px && *r.noise_px < implausibly_small_px)
     std::fprintf(stderr,
                  "lapservo: warning: %s: the lines meet almost exactly: if they were tracked with camera_from_rcm in "
@@ -241,34 +237,28 @@ int run(const EstimateRcmOptions& options) {
   }
   if (!rig) std::fprintf(stderr, "lapservo: note: without --rig the lens is taken to have no distortion\n");
   if (!options.out.empty()) std::printf("report: %s\n", options.out.c_str());
-  if (std::any_of(results.begin(), results.end(), [](const RcmResult& r) { return r.point_px.has_value(); })) return 0;
+  if (std::any_of(results.begin(), results.end(), [](const RcmResult& r) { return r.is_ok(); })) return 0;
   std::fprintf(stderr, "lapservo: no RCM was estimated: it takes two observations or more, in different directions\n");
   return 1;
 }
 
 }  // namespace
 
-void add_estimate_rcm(Command app, Run& run_later) {
-  auto options = std::make_shared<EstimateRcmOptions>();
-  Command command = app.add_subcommand(
-      "estimate-rcm", "Estimate where the RCM appears in the image, from the lines on which the instrument was seen.");
-  command
-      .add_option("observations", options->observations,
-                  "CSV of `lapservo track`, with a rig that has no camera_from_rcm (else it only repeats that one)")
-      .required();
-  command.add_option("--rig", options->rig,
+void add_estimate_rcm(Command app) {
+  auto [command, options] = app.add_subcommand<EstimateRcmOptions>(
+      "estimate-rcm", "Estimate where the RCM appears in the image, from the lines on which the instrument was seen.",
+      run);
+  command.add_option("observations", options.observations, required(),
+                     "CSV of `lapservo track`, with a rig that has no camera_from_rcm (else it only repeats that one)");
+  command.add_option("--rig", options.rig,
                      "To undistort the lines, and to compare with its camera_from_rcm where it has one");
-  command.add_option("--out", options->out,
-                     "CSV to write or replace: a row per instrument and method, in ideal pixels");
-  command
-      .add_option("--sigma-px", options->sigma_px,
-                  "Standard deviation of e0 and e3 in either coordinate; else estimated from how badly the lines meet")
-      .number_between(1e-6, 1000.0);
-  command
-      .add_option("--common-px", options->common_px,
-                  "Standard deviation of an error across the lines that all of them share and no number of lines "
-                  "averages out; the default is that of `lapservo track` behind a well calibrated lens")
-      .number_between(0.0, 1000.0);
+  command.add_option("--out", options.out, "CSV to write or replace: a row per instrument and method, in ideal pixels");
+  command.add_option(
+      "--sigma-px", options.sigma_px, between(1e-6, 1000.0),
+      "Standard deviation of e0 and e3 in either coordinate; else estimated from how badly the lines meet");
+  command.add_option("--common-px", options.common_px, between(0.0, 1000.0),
+                     "Standard deviation of an error across the lines that all of them share and no number of lines "
+                     "averages out; the default is that of `lapservo track` behind a well calibrated lens");
   command.footer(
       "Prints two estimates: weighted, by total least squares without outliers, and pairwise, the paper's mean of all\n"
       "intersections, with one standard deviation each. Lines should come from positions of the instrument that "
@@ -276,7 +266,6 @@ void add_estimate_rcm(Command app, Run& run_later) {
       "many frames of one position count as one line.\n"
       "Example:\n  lapservo track frames --rig camera_and_marker.yaml --single --out obs.csv\n"
       "  lapservo estimate-rcm obs.csv --rig camera_and_marker.yaml --out rcm.csv");
-  command.runs(run_later, [options] { return run(*options); });
 }
 
 }  // namespace lapservo::app

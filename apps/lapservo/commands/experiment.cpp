@@ -1,7 +1,6 @@
 #include <cstdio>
 #include <filesystem>
-#include <functional>
-#include <memory>
+#include <map>
 #include <optional>
 #include <string>
 #include <utility>
@@ -20,8 +19,8 @@
 #include "lapservo/experiments/rotation.h"
 #include "lapservo/experiments/tracking.h"
 #include "lapservo/report/html_report.h"
+#include "lapservo/rig/instruments.h"
 #include "lapservo/rig/rig.h"
-#include "lapservo/rig/single_instrument.h"
 
 namespace lapservo::app {
 using namespace internal;
@@ -37,8 +36,6 @@ struct ExperimentOptions {
 };
 
 // Measures, leaves the data in the folder, and reports.
-using Experiment = std::function<ReportSection(const ExperimentSetup& setup, const fs::path& folder)>;
-
 template <auto measure>
 ReportSection run_experiment(const ExperimentSetup& setup, const fs::path& folder) {
   const auto result = measure(setup);
@@ -46,15 +43,11 @@ ReportSection run_experiment(const ExperimentSetup& setup, const fs::path& folde
   return section_of(result, setup);
 }
 
-const std::vector<std::pair<std::string, Experiment>>& experiments() {
-  static const std::vector<std::pair<std::string, Experiment>> all{
-      {"illumination", run_experiment<measure_illumination>},
-      {"rcm", run_experiment<measure_rcm>},
-      {"rotation", run_experiment<measure_rotation>},
-      {"tracking", run_experiment<measure_tracking>},
-  };
-  return all;
-}
+const std::map<std::string, ReportSection (*)(const ExperimentSetup& setup, const fs::path& folder)> experiments{
+    {"illumination", run_experiment<measure_illumination>},
+    {"rcm", run_experiment<measure_rcm>},
+    {"rotation", run_experiment<measure_rotation>},
+    {"tracking", run_experiment<measure_tracking>}};
 
 ExperimentSetup setup_of(const ExperimentOptions& options) {
   ExperimentSetup setup;
@@ -104,7 +97,7 @@ std::pair<std::vector<ReportSection>, std::string> run_experiments(ExperimentSet
                                                                    const ExperimentOptions& options,
                                                                    const fs::path& folder) {
   std::vector<ReportSection> sections;
-  for (const auto& [name, experiment] : experiments()) {
+  for (const auto& [name, experiment] : experiments) {
     if (options.name != "all" && options.name != name) continue;
     std::optional<Progress> progress;
     setup.keep_going = [&progress, &label = name](int done, int total) {
@@ -145,25 +138,22 @@ int run(const ExperimentOptions& options) {
 
 }  // namespace
 
-void add_experiment(Command app, Run& run_later) {
-  auto options = std::make_shared<ExperimentOptions>();
-  Command command = app.add_subcommand("experiment", "The paper's experiments, in a simulator, as a report.");
+void add_experiment(Command app) {
+  auto [command, options] =
+      app.add_subcommand<ExperimentOptions>("experiment", "The paper's experiments, in a simulator, as a report.", run);
   std::vector<std::string> choices{"all"};
   std::string help = "Which: ";
-  for (const auto& [name, experiment] : experiments()) choices.push_back(name), help += name + ", ";
-  command.add_option("name", options->name, help + "all").required().one_of(choices);
-  command
-      .add_option("--out", options->out,
-                  fmt::format("Folder for report.html, the CSVs behind it and rig.yaml{}", OutputFolder::help))
-      .required();
-  command.add_flag("--force", options->force, OutputFolder::force_help);
-  command.add_option("--rig", options->rig,
+  for (const auto& [name, experiment] : experiments) choices.push_back(name), help += name + ", ";
+  command.add_option("name", options.name, required(one_of(choices)), help + "all");
+  command.add_option("--out", options.out, required(),
+                     fmt::format("Folder for report.html, the CSVs behind it and rig.yaml{}", OutputFolder::help));
+  command.add_flag("--force", options.force, OutputFolder::force_help);
+  command.add_option("--rig", options.rig,
                      "Camera and instrument (the first), with camera_from_rcm; else the built-in configs/paper.yaml");
-  command.add_option("--seed", options->seed, "Seed of positions, background and noise").seed_number();
-  command.add_option("--method", options->method, "centerline: the paper's; surface: the default; or both")
-      .one_of({"both", "centerline", "surface"});
+  command.add_option("--seed", options.seed, seed_number(), "Seed of positions, background and noise");
+  command.add_option("--method", options.method, one_of({"both", "centerline", "surface"}),
+                     "centerline: the paper's; surface: the default; or both");
   command.footer("Example:\n  lapservo experiment all --out results");
-  command.runs(run_later, [options] { return run(*options); });
 }
 
 }  // namespace lapservo::app

@@ -1,9 +1,9 @@
 #include <algorithm>
 #include <cstdio>
-#include <memory>
 #include <optional>
 #include <string>
 #include <unistd.h>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -17,7 +17,7 @@
 #include "lapservo/marker/decoder.h"
 #include "lapservo/marker/design.h"
 #include "lapservo/marker/drawing.h"
-#include "lapservo/rig/instrument_index.h"
+#include "lapservo/rig/instruments.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/rig/rig_writer.h"
 
@@ -34,10 +34,10 @@ struct ViewingOptions {
 };
 
 void add_viewing(Command command, ViewingOptions& options, const std::string& usual_focal) {
-  command.add_option("--focal-px", options.focal_px, "Focal length of the camera, else " + usual_focal)
-      .number_between(10.0, 1e5);
-  command.add_option("--distance-mm", options.distance_mm, "From the camera to the marker").number_between(5.0, 2000.0);
-  command.add_option("--sigma-px", options.sigma_px, "Noise of one boundary on one line").number_between(1e-4, 100.0);
+  command.add_option("--focal-px", options.focal_px, between(10.0, 1e5),
+                     "Focal length of the camera, else " + usual_focal);
+  command.add_option("--distance-mm", options.distance_mm, between(5.0, 2000.0), "From the camera to the marker");
+  command.add_option("--sigma-px", options.sigma_px, between(1e-4, 100.0), "Noise of one boundary on one line");
 }
 
 struct DesignOptions {
@@ -58,10 +58,7 @@ Marker given_marker(const DesignOptions& options) {
     marker.bands_upper_m[i] = 1e-3 * options.upper_mm[i];
     marker.bands_lower_m[i] = 1e-3 * options.lower_mm[i];
   }
-  if (const auto problem = marker_problem(marker)) throw InputError("marker", *problem);
-  if (const std::string problem = decoding_problem(marker); !problem.empty())
-    throw InputError("marker", "not decodable: " + problem);
-  return marker;
+  return decodable(marker, "marker");
 }
 
 // To eight digits, as it is written down.
@@ -213,61 +210,54 @@ int run_show(const RigOptions& options) {
   return 0;
 }
 
-void add_design(Command parent, Run& run_later) {
-  auto options = std::make_shared<DesignOptions>();
-  Command command = parent.add_subcommand("design", "Choose the bands of a marker, or evaluate given ones.");
-  command.add_option("--diameter-mm", options->diameter_mm, "Outer diameter, film included").number_between(0.5, 100.0);
-  command.add_option("--length-mm", options->length_mm, "Length of the marker; default three diameters")
-      .number_between(1.0, 500.0);
-  command.add_option("--smallest-band-mm", options->min_band_mm, "No band is shorter; default 3 mm or 12 px")
-      .number_between(0.1, 200.0);
-  command
-      .add_option("--print-error-mm", options->print_error_mm,
-                  "Standard deviation of where each boundary is printed and cut: minimise what it does to the "
-                  "rotation, together with the noise; else noise alone, and what 0.1 mm does is said")
-      .number_between(0.001, 10.0);
-  command.add_option("--hues", options->hues_deg, "Three hues in degrees, proximal to distal").finite_numbers();
-  command.add_option("--bands-upper-mm", options->upper_mm, "Evaluate this design: lengths at the upper edge")
-      .finite_numbers();
-  command.add_option("--bands-lower-mm", options->lower_mm, "and at the lower edge").finite_numbers();
-  command.add_option("--out", options->out, "Write the marker: block of a rig; a file of that name is replaced");
-  add_viewing(command, options->viewing, fmt::format("{:g}", usual_focal_px));
+void add_design(Command parent) {
+  auto [command, options] = parent.add_subcommand<DesignOptions>(
+      "design", "Choose the bands of a marker, or evaluate given ones.", run_design);
+  command.add_option("--diameter-mm", options.diameter_mm, between(0.5, 100.0), "Outer diameter, film included");
+  command.add_option("--length-mm", options.length_mm, between(1.0, 500.0),
+                     "Length of the marker; default three diameters");
+  command.add_option("--smallest-band-mm", options.min_band_mm, between(0.1, 200.0),
+                     "No band is shorter; default 3 mm or 12 px");
+  command.add_option("--print-error-mm", options.print_error_mm, between(0.001, 10.0),
+                     "Standard deviation of where each boundary is printed and cut: minimise what it does to the "
+                     "rotation, together with the noise; else noise alone, and what 0.1 mm does is said");
+  command.add_option("--hues", options.hues_deg, finite_numbers(), "Three hues in degrees, proximal to distal");
+  command.add_option("--bands-upper-mm", options.upper_mm, finite_numbers(),
+                     "Evaluate this design: lengths at the upper edge");
+  command.add_option("--bands-lower-mm", options.lower_mm, finite_numbers(), "and at the lower edge");
+  command.add_option("--out", options.out, "Write the marker: block of a rig; a file of that name is replaced");
+  add_viewing(command, options.viewing, fmt::format("{:g}", usual_focal_px));
   command.footer(
       "Example:\n  lapservo marker design --diameter-mm 8.4 --distance-mm 110 --out marker.yaml\n"
       "  lapservo marker design --bands-upper-mm 3.5,3.5,17 --bands-lower-mm 9.5,9.5,5");
-  command.runs(run_later, [options] { return run_design(*options); });
 }
 
-Command add_for_rig(Command parent, const std::string& name, const std::string& about,
-                    const std::shared_ptr<RigOptions>& options) {
-  Command command = parent.add_subcommand(name, about);
-  command.add_option("--rig", options->rig, "The rig whose marker it is").required();
-  command.add_option("--instrument", options->instrument, "Its name; default the first");
-  return command;
+std::pair<Command, RigOptions&> add_for_rig(Command parent, const std::string& name, const std::string& about,
+                                            int (*job)(const RigOptions&)) {
+  auto [command, options] = parent.add_subcommand<RigOptions>(name, about, job);
+  command.add_option("--rig", options.rig, required(), "The rig whose marker it is");
+  command.add_option("--instrument", options.instrument, "Its name; default the first");
+  return {command, options};
 }
 
 }  // namespace
 
-void add_marker(Command app, Run& run_later) {
+void add_marker(Command app) {
   Command marker = app.add_subcommand("marker", "Design, print and look at markers.");
   marker.require_subcommand();
   marker.footer("Example:\n  lapservo marker print --rig configs/example.yaml --out sheet.pdf");
-  add_design(marker, run_later);
+  add_design(marker);
 
-  auto printing = std::make_shared<RigOptions>();
-  Command print = add_for_rig(marker, "print", "Write a sheet to print at true scale.", printing);
-  print.add_option("--out", printing->out, "sheet.pdf or sheet.svg; a file of that name is replaced").required();
-  print.add_option("--paper", printing->paper, "a4 or letter").one_of({"a4", "letter"});
-  print.add_option("--copies", printing->copies, "Markers on the sheet, as many as fit").whole_number_between(1, 100);
+  auto [print, printing] = add_for_rig(marker, "print", "Write a sheet to print at true scale.", run_print);
+  print.add_option("--out", printing.out, required(), "sheet.pdf or sheet.svg; a file of that name is replaced");
+  print.add_option("--paper", printing.paper, one_of({"a4", "letter"}), "a4 or letter");
+  print.add_option("--copies", printing.copies, whole_between(1, 100), "Markers on the sheet, as many as fit");
   print.footer("Example:\n  lapservo marker print --rig configs/example.yaml --out sheet.pdf");
-  print.runs(run_later, [printing] { return run_print(*printing); });
 
-  auto showing = std::make_shared<RigOptions>();
-  Command show = add_for_rig(marker, "show", "Show what a rig's marker looks like unrolled.", showing);
-  show.add_option("--out", showing->out, "Write an image too: .svg, .pdf or .png; a file of that name is replaced");
-  add_viewing(show, showing->viewing, "the rig's");
+  auto [show, showing] = add_for_rig(marker, "show", "Show what a rig's marker looks like unrolled.", run_show);
+  show.add_option("--out", showing.out, "Write an image too: .svg, .pdf or .png; a file of that name is replaced");
+  add_viewing(show, showing.viewing, "the rig's");
   show.footer("Example:\n  lapservo marker show --rig configs/example.yaml --out marker.svg");
-  show.runs(run_later, [showing] { return run_show(*showing); });
 }
 
 }  // namespace lapservo::app

@@ -3,7 +3,6 @@
 #include <cmath>
 #include <cstdio>
 #include <iostream>
-#include <memory>
 #include <optional>
 #include <poll.h>
 #include <string>
@@ -18,7 +17,7 @@
 #include "apps/lapservo/cli/interrupt.h"
 #include "apps/lapservo/cli/progress.h"
 #include "apps/lapservo/cli/subcommands.h"
-#include "apps/lapservo/commands/calibrate/calibrate_steps.h"
+#include "apps/lapservo/commands/calibrate/calibrate_inputs.h"
 #include "apps/lapservo/inputs/live_images.h"
 #include "apps/lapservo/inputs/transports.h"
 #include "lapservo/control/calibration_motion.h"
@@ -273,7 +272,7 @@ int record(const RecordOptions& options) {
   SteadyClock clock;
   std::optional<MovingArm> arm;
   if (!options.move.empty())
-    arm.emplace(options, rig->instruments[named_instrument(*rig, options.instrument, options.rig)], transports, clock);
+    arm.emplace(options, rig->instruments[instrument_meant(*rig, options.instrument, options.rig)], transports, clock);
   Recording recording(options, rig, transports, clock);
   watch_for_interrupts();
   const std::string why = wait_for_end(options, clock, recording, arm ? &*arm : nullptr, transports);
@@ -287,39 +286,37 @@ int record(const RecordOptions& options) {
   return why.empty() && counts.images > 0 && (options.robot.empty() || counts.joints > 0) ? 0 : 1;
 }
 
-void add_record(Command app, Run& run_later) {
-  auto options = std::make_shared<RecordOptions>();
-  Command command =
-      app.add_subcommand("record", "Record a camera and an arm's joints into a bag, for calibrate, check and track.");
-  command
-      .add_option("--camera", options->camera,
-                  "Images: ros2:/topic or ros1:/topic, an Image or, where it ends in /compressed, a CompressedImage; "
-                  "/dev/videoN; gst:PIPELINE")
-      .required();
-  command.add_option("--robot", options->robot, "The arm whose measured_js is recorded too: ros2:PSM1 or ros1:PSM1");
-  command.add_option("--out", options->out, "Folder to make: a ROS 2 bag (MCAP); a second of raw 720p takes 80 MB")
-      .required();
-  command.add_option("--rig", options->rig,
+void add_record(Command app) {
+  const auto job = [](const RecordOptions& options, const Command& command) {
+    refuse_unused(options, command);
+    return record(options);
+  };
+  auto [command, options] = app.add_subcommand<RecordOptions>(
+      "record", "Record a camera and an arm's joints into a bag, for calibrate, check and track.", job);
+  command.add_option(
+      "--camera", options.camera, required(),
+      "Images: ros2:/topic or ros1:/topic, an Image or, where it ends in /compressed, a CompressedImage; "
+      "/dev/videoN; gst:PIPELINE");
+  command.add_option("--robot", options.robot, "The arm whose measured_js is recorded too: ros2:PSM1 or ros1:PSM1");
+  command.add_option("--out", options.out, required(),
+                     "Folder to make: a ROS 2 bag (MCAP); a second of raw 720p takes 80 MB");
+  command.add_option("--rig", options.rig,
                      "Its camera's size is that of /dev/videoN, else GStreamer's choice; also for --move");
-  command.add_option("--duration", options->duration_s, "Seconds, from the first image on; a turn takes its own time")
-      .number_between(1, 3600);
-  command.add_option("--fps", options->fps, "Keep no more images a second than about so many").number_between(1, 1000);
-  command
-      .add_option("--move", options->move,
-                  "Move the arm meanwhile, from where it is, as the calibrations want it: swing (registration, check: "
-                  "all joints, for --duration), turn (marker: a full turn about its axis)")
-      .one_of({"swing", "turn"});
-  command.add_option("--instrument", options->instrument,
-                     "For --move: the arm's name in the rig, where it has several");
-  command
-      .add_option("--scale", options->scale,
-                  "Scale of a swing: 1 is 0.25 rad, 0.2 rad, 10 mm, 1 rad to either side at most")
-      .number_between(0.05, 4);
-  add_setpoint_readers_option(command, options->setpoint_readers);
-  command.add_option("--joint-limits", options->joint_limits,
+  command.add_option("--duration", options.duration_s, between(1, 3600),
+                     "Seconds, from the first image on; a turn takes its own time");
+  command.add_option("--fps", options.fps, between(1, 1000), "Keep no more images a second than about so many");
+  command.add_option(
+      "--move", options.move, one_of({"swing", "turn"}),
+      "Move the arm meanwhile, from where it is, as the calibrations want it: swing (registration, check: "
+      "all joints, for --duration), turn (marker: a full turn about its axis)");
+  command.add_option("--instrument", options.instrument, "For --move: the arm's name in the rig, where it has several");
+  command.add_option("--scale", options.scale, between(0.05, 4),
+                     "Scale of a swing: 1 is 0.25 rad, 0.2 rad, 10 mm, 1 rad to either side at most");
+  add_setpoint_readers_option(command, options.setpoint_readers);
+  command.add_option("--joint-limits", options.joint_limits,
                      "For --move: YAML of the arm's joints, between which they stay, for example "
                      "configs/joint_limits/psm-classic.yaml");
-  command.add_flag("--enable-motion", options->enable_motion, "For --move: do move the arm");
+  command.add_flag("--enable-motion", options.enable_motion, "For --move: do move the arm");
   command.footer(
       "An arm that is moved starts from rest, when it has been ready for half a second, and ends at rest; whatever is "
       "amiss with it ends the motion, and it stays where it is.\n"
@@ -327,7 +324,6 @@ void add_record(Command app, Run& run_later) {
       "--joint-limits.\n"
       "Example:\n  lapservo record --camera ros2:/endoscope/image_raw --robot ros2:PSM1 --out swing\n"
       "  lapservo calibrate registration swing --rig rig.yaml --out rig.yaml");
-  command.runs(run_later, [options, command] { return refuse_unused(*options, command), record(*options); });
 }
 
 }  // namespace lapservo::app

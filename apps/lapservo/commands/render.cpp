@@ -2,7 +2,6 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
-#include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -46,37 +45,27 @@ struct RenderArguments {
 };
 
 // The truth.csv beside rendered frames: what is where, per frame and instrument. The columns of ../shared/frames.
-class TruthCsv {
- public:
-  explicit TruthCsv(const std::filesystem::path& path) : file_(path) {
-    file_.stream() << "file,instrument,condition,theta_rad,phi_rad,rho_m,psi_rad,tau_rad,"
-                      "e0_u_px,e0_v_px,e1_u_px,e1_v_px,e2_u_px,e2_v_px,e3_u_px,e3_v_px,"
-                      "s_rad,r_px,l_px,d_px,rcm_u_px,rcm_v_px\n";
+constexpr auto truth_header =
+    "file,instrument,condition,theta_rad,phi_rad,rho_m,psi_rad,tau_rad,e0_u_px,e0_v_px,e1_u_px,e1_v_px,e2_u_px,"
+    "e2_v_px,e3_u_px,e3_v_px,s_rad,r_px,l_px,d_px,rcm_u_px,rcm_v_px\n";
+
+// The instrument must have camera_from_rcm, and its marker lie before the camera (else std::invalid_argument).
+std::string truth_row(const std::string& file, const Camera& camera, const Instrument& instrument,
+                      const JointVector& q) {
+  const Rigid3& camera_from_rcm = instrument.camera_from_rcm.value();
+  const auto line = centre_line(camera, instrument.marker, camera_from_rcm * rcm_from_unrolled(q), q.psi_rad);
+  const auto rcm_px = projected_rcm_px(camera, camera_from_rcm);
+  if (!line || !rcm_px) throw std::invalid_argument("the marker does not lie before the camera");
+  const Features f = features_of(line->ideal_px, rcm_px);
+  std::string row = fmt::format("{},{},rendered,{:.7f},{:.7f},{:.7f},{:.7f},{:.7f}", file, instrument.name, q.theta_rad,
+                                q.phi_rad, q.rho_m, q.psi_rad, line->tau_rad);
+  for (const Eigen::Vector2d& ideal : line->ideal_px) {
+    const Eigen::Vector2d raw = camera.raw_from_ideal(ideal);
+    row += fmt::format(",{:.7f},{:.7f}", raw.x(), raw.y());
   }
-
-  // The instrument must have camera_from_rcm, and its marker lie before the camera (else std::invalid_argument).
-  void add(const std::string& file, const Camera& camera, const Instrument& instrument, const JointVector& q) {
-    const Rigid3& camera_from_rcm = instrument.camera_from_rcm.value();
-    const auto line = centre_line(camera, instrument.marker, camera_from_rcm * rcm_from_unrolled(q), q.psi_rad);
-    const auto rcm_px = projected_rcm_px(camera, camera_from_rcm);
-    if (!line || !rcm_px) throw std::invalid_argument("the marker does not lie before the camera");
-    const Features f = features_of(line->ideal_px, rcm_px);
-    std::string row = fmt::format("{},{},rendered,{:.7f},{:.7f},{:.7f},{:.7f},{:.7f}", file, instrument.name,
-                                  q.theta_rad, q.phi_rad, q.rho_m, q.psi_rad, line->tau_rad);
-    for (const Eigen::Vector2d& ideal : line->ideal_px) {
-      const Eigen::Vector2d raw = camera.raw_from_ideal(ideal);
-      row += fmt::format(",{:.7f},{:.7f}", raw.x(), raw.y());
-    }
-    row += fmt::format(",{:.7f},{:.7f},{:.7f},{:.7f},{:.7f},{:.7f}", f.s_rad, *f.r_px, f.l_px, f.d_px, rcm_px->x(),
-                       rcm_px->y());
-    file_.stream() << row << '\n';
-  }
-
-  void commit() { file_.commit(); }
-
- private:
-  AtomicFile file_;
-};
+  return row + fmt::format(",{:.7f},{:.7f},{:.7f},{:.7f},{:.7f},{:.7f}\n", f.s_rad, *f.r_px, f.l_px, f.d_px,
+                           rcm_px->x(), rcm_px->y());
+}
 
 JointVector random_configuration(const Camera& camera, const Instrument& instrument, const std::string& rig,
                                  Random& random) {
@@ -116,13 +105,9 @@ std::vector<Configurations> random_configurations(const Rig& rig, const RenderAr
 
 cv::Mat background_light(const Camera& camera, const RenderArguments& options) {
   if (options.background == "tissue") return make_tissue(camera.width_px, camera.height_px, options.seed);
-  cv::Mat picture = read_image(options.background), scaled;
+  cv::Mat picture = read_image(options.background), scaled, light;
   cv::resize(picture, scaled, {camera.width_px, camera.height_px}, 0, 0, cv::INTER_AREA);
-  const auto table = camera.response.table();
-  cv::Mat light(scaled.size(), CV_32FC3);
-  for (int v = 0; v < scaled.rows; ++v)
-    for (int u = 0; u < scaled.cols; ++u)
-      for (int c = 0; c < 3; ++c) light.at<cv::Vec3f>(v, u)[c] = table[scaled.at<cv::Vec3b>(v, u)[c]];
+  cv::LUT(scaled, cv::Mat(camera.response.table()), light);
   return light;
 }
 
@@ -179,7 +164,8 @@ int run(const RenderArguments& options) {
   const auto frames =
       options.poses.empty() ? random_configurations(rig, options) : read_configurations(options.poses, rig);
   Renderer renderer = make_renderer(rig, options);
-  TruthCsv truth(folder / "truth.csv");
+  AtomicFile truth(folder / "truth.csv");
+  truth.stream() << truth_header;
   std::optional<VideoWriter> video;
   if (options.video) video.emplace(folder / "video.mp4", options.fps, VideoUse::measured);
   watch_for_interrupts();
@@ -190,7 +176,7 @@ int run(const RenderArguments& options) {
       const std::string name = fmt::format("{:04}.{}", i, options.format);
       for (std::size_t k = 0; k < rig.instruments.size(); ++k) {
         try {
-          truth.add(name, rig.camera, rig.instruments[k], frames[i][k]);
+          truth.stream() << truth_row(name, rig.camera, rig.instruments[k], frames[i][k]);
         } catch (const std::invalid_argument& error) {
           throw InputError(options.poses, fmt::format("frame {}: {}", i, error.what()));
         }
@@ -214,36 +200,32 @@ int run(const RenderArguments& options) {
 
 }  // namespace
 
-void add_render(Command app, Run& run_later) {
-  auto options = std::make_shared<RenderArguments>();
-  Command command = app.add_subcommand("render", "Render frames of a rig with exact truth.");
-  command.add_option("--rig", options->rig, "Camera and instruments, with camera_from_rcm").required();
-  command
-      .add_option("--out", options->out,
-                  std::string("Folder for NNNN.png, truth.csv and rig.yaml") + OutputFolder::help)
-      .required();
-  command.add_option("--poses", options->poses,
+void add_render(Command app) {
+  auto [command, options] =
+      app.add_subcommand<RenderArguments>("render", "Render frames of a rig with exact truth.", run);
+  command.add_option("--rig", options.rig, required(), "Camera and instruments, with camera_from_rcm");
+  command.add_option("--out", options.out, required(),
+                     std::string("Folder for NNNN.png, truth.csv and rig.yaml") + OutputFolder::help);
+  command.add_option("--poses", options.poses,
                      "CSV of theta_rad, phi_rad, rho_m, psi_rad (and instrument), a row a frame and instrument; else "
                      "random ones in view");
-  command.add_option("--count", options->count, "How many random configurations").whole_number_between(1, 100000);
-  command.add_option("--seed", options->seed, "Seed of configurations, background and noise").seed_number();
-  command.add_flag("--moving", options->moving, "A smooth path through random configurations");
-  command.add_option("--background", options->background, "An image, or tissue");
-  command.add_option("--light", options->light, "Exposure, 1 is normal").number_between(0.01, 10.0);
-  command.add_option("--smoke", options->smoke, "Share of grey veil, 0 to 1").number_between(0.0, 1.0);
-  command.add_option("--blood", options->blood, "Share of the marker covered, 0 to 0.9").number_between(0.0, 0.9);
-  command.add_option("--noise", options->noise, "Times the sensor's usual noise").number_between(0.0, 20.0);
-  command.add_option("--blur-px", options->blur_px, "Sigma of the optical blur").number_between(0.0, 20.0);
-  command.add_option("--motion", options->motion, "Motion blur: fraction of the step to the next frame, 0 to 1")
-      .number_between(0.0, 1.0);
-  command.add_option("--film-mm", options->film_mm, "Thickness of the film that carries the marker")
-      .number_between(0.0, 1.0);
-  command.add_option("--format", options->format, "png or jpg").one_of({"png", "jpg"});
-  command.add_flag("--video", options->video, "Write video.mp4 instead of images");
-  command.add_option("--fps", options->fps, "Frame rate of the video").number_between(0.1, 1000.0);
-  command.add_flag("--force", options->force, OutputFolder::force_help);
+  command.add_option("--count", options.count, whole_between(1, 100000), "How many random configurations");
+  command.add_option("--seed", options.seed, seed_number(), "Seed of configurations, background and noise");
+  command.add_flag("--moving", options.moving, "A smooth path through random configurations");
+  command.add_option("--background", options.background, "An image, or tissue");
+  command.add_option("--light", options.light, between(0.01, 10.0), "Exposure, 1 is normal");
+  command.add_option("--smoke", options.smoke, between(0.0, 1.0), "Share of grey veil, 0 to 1");
+  command.add_option("--blood", options.blood, between(0.0, 0.9), "Share of the marker covered, 0 to 0.9");
+  command.add_option("--noise", options.noise, between(0.0, 20.0), "Times the sensor's usual noise");
+  command.add_option("--blur-px", options.blur_px, between(0.0, 20.0), "Sigma of the optical blur");
+  command.add_option("--motion", options.motion, between(0.0, 1.0),
+                     "Motion blur: fraction of the step to the next frame, 0 to 1");
+  command.add_option("--film-mm", options.film_mm, between(0.0, 1.0), "Thickness of the film that carries the marker");
+  command.add_option("--format", options.format, one_of({"png", "jpg"}), "png or jpg");
+  command.add_flag("--video", options.video, "Write video.mp4 instead of images");
+  command.add_option("--fps", options.fps, between(0.1, 1000.0), "Frame rate of the video");
+  command.add_flag("--force", options.force, OutputFolder::force_help);
   command.footer("Example:\n  lapservo render --rig configs/example.yaml --out frames --count 50 --moving --blood 0.2");
-  command.runs(run_later, [options] { return run(*options); });
 }
 
 }  // namespace lapservo::app

@@ -4,7 +4,6 @@
 #include <cstdio>
 #include <filesystem>
 #include <functional>
-#include <memory>
 #include <string>
 #include <system_error>
 
@@ -20,7 +19,6 @@
 #include "lapservo/core/error.h"
 #include "lapservo/geometry/rotation.h"
 #include "lapservo/io/image_file.h"
-#include "lapservo/io/video/video_encoder.h"
 #include "lapservo/io/video/video_writer.h"
 #include "lapservo/rig/joint_conversion.h"
 #include "lapservo/rig/rig_writer.h"
@@ -181,10 +179,10 @@ int run(const std::string& folder) {
 
 }  // namespace
 
-void add_sample(Command app, Run& run_later) {
-  auto folder = std::make_shared<std::string>();
-  Command command = app.add_subcommand("sample", "Render the recordings of a first calibration, for the tutorial.");
-  command.add_option("folder", *folder, "New or empty").required();
+void add_sample(Command app) {
+  auto [command, folder] =
+      app.add_subcommand<std::string>("sample", "Render the recordings of a first calibration, for the tutorial.", run);
+  command.add_option("folder", folder, required(), "New or empty");
   command.footer(
       "rig.yaml     camera and marker by data sheets and callipers, to begin from\n"
       "boards/      a chessboard of 9x6 inner corners and squares of 5 mm\n"
@@ -194,7 +192,6 @@ void add_sample(Command app, Run& run_later) {
       "truth.yaml   the rig that calibration should find\n"
       "joint_limits.yaml  limits of the simulated arm's joints, for servo --joint-limits\n"
       "Example:\n  lapservo sample morning");
-  command.runs(run_later, [folder] { return run(*folder); });
 }
 
 }  // namespace lapservo::app

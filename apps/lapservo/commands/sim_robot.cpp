@@ -4,7 +4,6 @@
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
-#include <memory>
 #include <string>
 #include <thread>
 #include <vector>
@@ -20,7 +19,7 @@
 #include "lapservo/core/error.h"
 #include "lapservo/core/random.h"
 #include "lapservo/crtk/crtk_robot.h"
-#include "lapservo/rig/single_instrument.h"
+#include "lapservo/rig/instruments.h"
 #include "lapservo/robot/steady_clock.h"
 #include "lapservo/servo/image_features.h"
 #include "lapservo/servo/image_window.h"
@@ -114,30 +113,26 @@ int run(const SimRobotOptions& options) {
 
 }  // namespace
 
-void add_sim_robot(Command app, Run& run_later) {
-  auto options = std::make_shared<SimRobotOptions>();
-  Command command =
-      app.add_subcommand("sim-robot", "Be an arm and its camera, simulated, for another process to steer.");
-  command.add_option("--rig", options->rig, "The scene before the camera");
-  command.add_option("--transport", options->transport, "ros2 or ros1");
-  command.add_option("--arm", options->arm, "Namespace of its CRTK topics, where no other arm is");
-  command.add_option("--camera", options->camera, "Namespace of image_raw and camera_info");
-  command.add_option("--start", options->start, "Measured joints to start from, theta,phi,rho,psi; else random")
-      .finite_numbers(4);
-  command.add_option("--seed", options->seed, "Seed of start, tissue, noise, jitter").seed_number();
-  command.add_option("--latency-ms", options->latency_ms, "From exposure to publication").number_between(0.0, 1000.0);
-  command.add_option("--fps", options->fps, "Frames a second").number_between(6.0, 120.0);
-  command
-      .add_option("--swing-wrist", options->swing_wrist_rad,
-                  "Rad: the wrist's first joint moves by itself, there and back within 4 s")
-      .number_between(0.0, 1.0);
-  command.add_option("--duration", options->duration_s, "Seconds; 0: until interrupted").number_between(0.0, 1e6);
+void add_sim_robot(Command app) {
+  auto [command, options] = app.add_subcommand<SimRobotOptions>(
+      "sim-robot", "Be an arm and its camera, simulated, for another process to steer.", run);
+  command.add_option("--rig", options.rig, "The scene before the camera");
+  command.add_option("--transport", options.transport, "ros2 or ros1");
+  command.add_option("--arm", options.arm, "Namespace of its CRTK topics, where no other arm is");
+  command.add_option("--camera", options.camera, "Namespace of image_raw and camera_info");
+  command.add_option("--start", options.start, finite_numbers(4),
+                     "Measured joints to start from, theta,phi,rho,psi; else random");
+  command.add_option("--seed", options.seed, seed_number(), "Seed of start, tissue, noise, jitter");
+  command.add_option("--latency-ms", options.latency_ms, between(0.0, 1000.0), "From exposure to publication");
+  command.add_option("--fps", options.fps, between(6.0, 120.0), "Frames a second");
+  command.add_option("--swing-wrist", options.swing_wrist_rad, between(0.0, 1.0),
+                     "Rad: the wrist's first joint moves by itself, there and back within 4 s");
+  command.add_option("--duration", options.duration_s, between(0.0, 1e6), "Seconds; 0: until interrupted");
   command.footer(
       "Example, in two terminals (ROS_LOCALHOST_ONLY=1 keeps it on this computer):\n"
       "  lapservo sim-robot --rig configs/paper.yaml\n"
       "  lapservo servo --rig configs/paper.yaml --robot ros2:SIM_PSM1 --camera ros2:/endoscope/image_raw "
       "--enable-motion --joint-limits configs/joint_limits/psm-classic.yaml");
-  command.runs(run_later, [options] { return run(*options); });
 }
 
 }  // namespace lapservo::app

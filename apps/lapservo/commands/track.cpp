@@ -28,6 +28,7 @@
 #include "cameras/live_source.h"
 #include "lapservo/calibration/check/frame_diagnosis.h"
 #include "lapservo/core/error.h"
+#include "lapservo/core/row_file.h"
 #include "lapservo/crtk/transport.h"
 #include "lapservo/crtk/wrist_history.h"
 #include "lapservo/io/frame_source.h"
@@ -35,9 +36,8 @@
 #include "lapservo/io/overlay.h"
 #include "lapservo/io/tables/observation_csv.h"
 #include "lapservo/io/video/overlay_writer.h"
-#include "lapservo/io/video/video_encoder.h"
+#include "lapservo/io/video/video_writer.h"
 #include "lapservo/rig/registration_covariance.h"
-#include "lapservo/rig/registration_text.h"
 #include "lapservo/robot/steady_clock.h"
 #include "lapservo/servo/registration_watch.h"
 #include "lapservo/tool/wrist.h"
@@ -273,7 +273,7 @@ PageConfig page_config_of(const TrackOptions& options, const FrameSource& source
 // Until then, or until somebody wants the end.
 void wait_on_page(WebView& web, const std::function<bool()>& done) {
   SteadyClock clock;
-  while (!interrupted() && !web.wishes().stop && !done()) clock.sleep_until(clock.now_s() + 0.005);
+  while (!interrupted() && !web.take_wishes().stop && !done()) clock.sleep_until(clock.now_s() + 0.005);
 }
 
 // /tf and the rest of FrameTopics. Begins with the first frame, with which the rig is known.
@@ -309,10 +309,10 @@ class TrackRun {
       rigs_.expect_pictures();
     if (names_topic(options.joints)) live_wrist_.emplace(options.joints);
     if (!options.publish.empty()) publishing_.emplace(options);
-    if (options.web.port) web_.emplace(options.web, page_config_of(options, source_));
+    if (options.web.port) web_ = open_page(options.web, page_config_of(options, source_));
     refuse_other_kind(options.out, ".csv");
-    if (!options.page_only) csv_.emplace(options.out);
-    if (!options.overlay.empty()) overlay_ = open_overlay_writer(options.overlay, source_);
+    if (!options.page_only) csv_.emplace(options.out, observation_csv_header);
+    if (!options.overlay.empty()) overlay_.emplace(options.overlay, source_);
   }
 
   /// The command's exit code.
@@ -398,12 +398,12 @@ class TrackRun {
   // To all that want it; false when somebody who looks wants the end.
   bool pass_on(const Frame& frame, const std::vector<Observation>& observations, double came_s) {
     for (const Observation& observation : observations)
-      if (csv_) csv_->add(frame.index, frame.time_s, frame.file.filename().string(), observation);
+      if (csv_) csv_->add(observation_csv_row(frame.index, frame.time_s, frame.file.filename().string(), observation));
     if (overlay_) overlay_->add(frame, draw_overlay(frame.bgr, *rigs_.rig(), observations));
     if (publishing_) publishing_->publish(rigs_.rig(), observations, clock_.now_s() - came_s);
     if (!web_) return true;
     web_->show({frame.bgr, rigs_.rig(), observations, clock_.now_s() - came_s});
-    return !web_->wishes().stop;
+    return !web_->take_wishes().stop;
   }
 
   void tell_results() const {
@@ -446,9 +446,9 @@ class TrackRun {
   std::unique_ptr<FrameSource> file_;
   FrameSource& source_;
   std::optional<Publishing> publishing_;
-  std::optional<WebView> web_;
-  std::optional<ObservationCsv> csv_;
-  std::unique_ptr<OverlayWriter> overlay_;
+  std::unique_ptr<WebView> web_;
+  std::optional<RowFile> csv_;
+  std::optional<OverlayWriter> overlay_;
   std::optional<LiveWrist> live_wrist_;
   std::shared_ptr<const Rig> wrists_of_;
   std::vector<WristInput> wrists_;  // an instrument, by that rig
@@ -469,12 +469,10 @@ int run(const TrackOptions& options) {
 
 // Options of both commands.
 void add_input_options(Command command, TrackOptions& options) {
-  command
-      .add_option(
-          "input", options.input,
-          "Image, folder of images, video file, bag of ROS 1 or 2, camera (0, /dev/video0), stream (rtsp://...), topic "
-          "(ros2:/image_raw, ros1:/image_raw/compressed) or GStreamer pipeline without its sink (gst:decklinkvideosrc)")
-      .required();
+  command.add_option(
+      "input", options.input, required(),
+      "Image, folder of images, video file, bag of ROS 1 or 2, camera (0, /dev/video0), stream (rtsp://...), topic "
+      "(ros2:/image_raw, ros1:/image_raw/compressed) or GStreamer pipeline without its sink (gst:decklinkvideosrc)");
   add_image_topic_option(command, options.image_topic);
   add_video_options(command, options);
   command.add_option("--rig", options.rig,
@@ -483,55 +481,49 @@ void add_input_options(Command command, TrackOptions& options) {
                      "Readings of a tool's wrist, for the tip: a CSV (time_s and a column a joint), a bag, or a topic "
                      "(ros2:/PSM1/measured_js); without it those in the input, where it is a bag");
   add_joint_topic_option(command, options.joint_topic);
-  command.add_option("--method", options.method, "surface: all visible lines; centerline: the paper's Algorithm 1")
-      .one_of({"surface", "centerline"});
+  command.add_option("--method", options.method, one_of({"surface", "centerline"}),
+                     "surface: all visible lines; centerline: the paper's Algorithm 1");
   command.add_flag("--single", options.single, "Treat every frame on its own, without tracking from the frame before");
   command.add_flag("--deinterlace", options.deinterlace,
                    "For interlaced video (status: interlaced): track the field of the even rows; the same as "
                    "deinterlace: true in the rig's camera");
-  command.add_option("--fps", options.fps, "Frames per second of a folder's images").number_between(0.001, 100000.0);
+  command.add_option("--fps", options.fps, between(0.001, 100000.0), "Frames per second of a folder's images");
 }
 
 }  // namespace
 
-void add_track(Command app, Run& run_later) {
-  auto options = std::make_shared<TrackOptions>();
-  Command command =
-      app.add_subcommand("track", "Measure the instruments in images, a video, a bag or a camera's frames.");
-  add_input_options(command, *options);
-  command.add_option("--out", options->out,
+void add_track(Command app) {
+  auto [command, options] = app.add_subcommand<TrackOptions>(
+      "track", "Measure the instruments in images, a video, a bag or a camera's frames.", run);
+  add_input_options(command, options);
+  command.add_option("--out", options.out,
                      "CSV of observations, replacing one of that name when all is measured; until then, and if the run "
                      "is stopped, the rows are in NAME.part, which the next run of that name writes over");
   command.add_option(
-      "--overlay", options->overlay,
+      "--overlay", options.overlay,
       "Write images (a folder) or a video (.mp4) with the detection drawn in, replacing those of the same name");
-  add_web_options(command, options->web);
-  command
-      .add_option("--publish", options->publish,
-                  "Publish /tf, poses and markers over this transport, see docs/messages.md#frames")
-      .one_of({"ros2", "ros1"});
-  add_frame_names_option(command, options->tf_frames);
-  command.add_option("--frames", options->frames, "End after so many; 0: all, a camera's until Ctrl-C")
-      .whole_number_between(0, 1000000000);
+  add_web_options(command, options.web);
+  command.add_option("--publish", options.publish, one_of({"ros2", "ros1"}),
+                     "Publish /tf, poses and markers over this transport, see docs/messages.md#frames");
+  add_frame_names_option(command, options.tf_frames);
+  command.add_option("--frames", options.frames, whole_between(0, 1000000000),
+                     "End after so many; 0: all, a camera's until Ctrl-C");
   command.footer("Example:\n  lapservo track video.mp4 --rig rig.yaml --out obs.csv --overlay overlay.mp4");
-  command.runs(run_later, [options] { return run(*options); });
 }
 
-void add_view(Command app, Run& run_later) {
-  auto options = std::make_shared<TrackOptions>();
-  options->page_only = true;
-  options->out.clear();
-  Command command =
-      app.add_subcommand("view", "Show what is measured in images, a video or a camera's frames on a page.");
-  add_input_options(command, *options);
-  add_page_options(command, options->web);
+void add_view(Command app) {
+  auto [command, options] = app.add_subcommand<TrackOptions>(
+      "view", "Show what is measured in images, a video or a camera's frames on a page.", run);
+  options.page_only = true;
+  options.out.clear();
+  add_input_options(command, options);
+  add_web_options(command, options.web, true);
   command.footer(
       "Files are shown at their own pace, once, when a browser shows the page. A browser on another computer reaches "
       "the page by\n"
       "ssh -L 8080:localhost:8080 THIS_COMPUTER, or with --listen by the address that is printed.\n"
       "Example:\n"
       "  lapservo view ros2:/endoscope/image_raw --rig rig.yaml");
-  command.runs(run_later, [options] { return run(*options); });
 }
 
 }  // namespace lapservo::app

@@ -76,8 +76,8 @@ std::pair<std::unique_ptr<FrameSource>, std::string> open_whole(const std::strin
   }
 #ifdef LAPSERVO_BAGS
   if (is_session(input)) {
-    Session session(input, options.image_topic, reading);
-    return {session.frames(), session.layout()};
+    auto [frames, layout] = open_session(input, options.image_topic, reading);
+    return {std::move(frames), std::move(layout)};
   }
 #endif
   refuse_topic_outside_bags("--image-topic", options.image_topic, input);
@@ -114,25 +114,19 @@ void add_image_topic_option(Command command, std::string& image_topic) {
 }
 
 void add_eye_options(Command command, FrameOptions& options) {
-  command
-      .add_option("--eye", options.eye,
-                  "The eye that is the rig's camera, where frames have both of an endoscope side by side")
-      .one_of({"left", "right"});
-  command
-      .add_option("--side-by-side", options.side_by_side,
-                  "With --eye: which eye is on the left of the frames (LR: the left one); else as a session of "
-                  "dvrk_data says, or LR")
-      .one_of({"LR", "RL"});
+  command.add_option("--eye", options.eye, one_of({"left", "right"}),
+                     "The eye that is the rig's camera, where frames have both of an endoscope side by side");
+  command.add_option("--side-by-side", options.side_by_side, one_of({"LR", "RL"}),
+                     "With --eye: which eye is on the left of the frames (LR: the left one); else as a session of "
+                     "dvrk_data says, or LR");
 }
 
 void add_video_options(Command command, FrameOptions& options) {
   add_eye_options(command, options);
-  command.add_option("--colour-matrix", options.colour_matrix, "Colour matrix of a video, in the place of its own")
-      .one_of({"bt601", "bt709", "bt2020"});
-  command
-      .add_option("--chroma-location", options.chroma_location,
-                  "Place of the samples of chroma of a video, whatever it names; else as it names")
-      .one_of({"left", "centre", "top-left"});
+  command.add_option("--colour-matrix", options.colour_matrix, one_of({"bt601", "bt709", "bt2020"}),
+                     "Colour matrix of a video, in the place of its own");
+  command.add_option("--chroma-location", options.chroma_location, one_of({"left", "centre", "top-left"}),
+                     "Place of the samples of chroma of a video, whatever it names; else as it names");
 }
 
 std::vector<std::string> frame_option_names() {

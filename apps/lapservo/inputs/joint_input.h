@@ -10,13 +10,6 @@
 
 namespace lapservo::app {
 
-/// The joints' readings during the frames.
-struct JointInput {
-  Joints joints;
-  internal::JointRecording recording;
-  std::string source;  ///< for complaints
-};
-
 void add_joint_options(Command command, CalibrateOptions& options, const std::string& help);
 void add_joint_topic_option(Command command, std::string& joint_topic);
 
@@ -24,12 +17,12 @@ void add_joint_topic_option(Command command, std::string& joint_topic);
 /// nullopt. Reads the instrument's joints; where it has none, the recording's own four in the order theta, phi, rho,
 /// psi. A bag's stamps go with those of `frames`; where these have none, or there is nullptr, its times begin with its
 /// joints. Throws InputError for other files.
-std::optional<JointInput> find_joint_input(const CalibrateOptions& options, const Instrument& instrument,
-                                           const FrameSource* frames);
+std::optional<internal::JointInput> find_joint_input(const CalibrateOptions& options, const Instrument& instrument,
+                                                     const FrameSource* frames);
 
 /// The readings of the joints of a tool's wrist during the frames.
 struct WristInput {
-  std::optional<JointInput> readings;
+  std::optional<internal::JointInput> readings;
   std::string none;  ///< why there are none, with the remedy; empty for a tool without a wrist
 };
 

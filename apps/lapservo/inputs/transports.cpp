@@ -1,33 +1,24 @@
 #include "apps/lapservo/inputs/transports.h"
 
+#include <algorithm>
 #include <set>
 #include <sstream>
 #include <vector>
 
+#include "lapservo/core/environment.h"
 #include "lapservo/core/error.h"
 #include "lapservo/core/printable.h"
+#include "transports/named_transport.h"
 #ifdef LAPSERVO_ROS1
 #include "transports/ros1/ros1_names.h"
-#include "transports/ros1/ros1_transport.h"
-#endif
-#ifdef LAPSERVO_ROS2
-#include "transports/ros2/ros2_transport.h"
 #endif
 
 namespace lapservo::app {
 using namespace internal;
-namespace {
-
-[[noreturn]] [[maybe_unused]] void refuse_missing(const std::string& option, const std::string& transport,
-                                                  const std::string& packages) {
-  throw InputError(option, "is " + transport + ", which this build lacks: it was built without " + packages);
-}
-
-}  // namespace
 
 std::string resolved_name(const Address& address, [[maybe_unused]] const std::string& option) {
 #ifdef LAPSERVO_ROS1
-  if (address.transport == "ros1") return resolved_ros1_name(address.name, ros1_namespace(), option);
+  if (address.transport == "ros1") return resolved_ros1_name(address.name, environment("ROS_NAMESPACE"), option);
 #endif
   return address.name;
 }
@@ -42,24 +33,15 @@ Address address_of(const std::string& text, const std::string& option) {
   return address;
 }
 
-std::unique_ptr<Transport> make_transport(const std::string& transport, [[maybe_unused]] const std::string& node_name,
+std::unique_ptr<Transport> make_transport(const std::string& transport, const std::string& node_name,
                                           const std::string& option) {
-  if (transport == "ros2") {
-#ifdef LAPSERVO_ROS2
-    return std::make_unique<Ros2Transport>(node_name);
-#else
-    refuse_missing(option, transport, "cyclonedds-dev and cyclonedds-tools");
-#endif
-  }
-  if (transport == "ros1") {
-#ifdef LAPSERVO_ROS1
-    return std::make_unique<Ros1Transport>(node_name);
-#else
-    refuse_missing(
-        option, transport,
-        "libroscpp-dev, libsensor-msgs-dev, libdiagnostic-msgs-dev, libtrajectory-msgs-dev and python3-gencpp");
-#endif
-  }
+  if (std::ranges::count(named_transports(), transport) > 0) return named_transport(transport, node_name);
+  for (const auto& [name, packages] :
+       {std::pair{"ros2", "cyclonedds-dev and cyclonedds-tools"},
+        {"ros1",
+         "libroscpp-dev, libsensor-msgs-dev, libdiagnostic-msgs-dev, libtrajectory-msgs-dev and python3-gencpp"}})
+    if (transport == name)
+      throw InputError(option, "is " + transport + ", which this build lacks: it was built without " + packages);
   throw InputError(option, "is " + transport + ", expected ros2 or ros1");
 }
 
@@ -84,11 +66,10 @@ FrameNames frame_names_of(const std::string& frames) {
 }
 
 void add_setpoint_readers_option(Command command, int& setpoint_readers) {
-  command
-      .add_option("--setpoint-readers", setpoint_readers,
-                  "Nodes that may read servo_jp: the arm's and, for example, a recorder's; while there are more, the "
-                  "arm is not moved")
-      .whole_number_between(1, 64);
+  command.add_option(
+      "--setpoint-readers", setpoint_readers, whole_between(1, 64),
+      "Nodes that may read servo_jp: the arm's and, for example, a recorder's; while there are more, the "
+      "arm is not moved");
 }
 
 void require_joint_limits(const std::string& option, const std::string& joint_limits) {

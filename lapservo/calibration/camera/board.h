@@ -1,10 +1,18 @@
 #pragma once
 
+#include <array>
+#include <cstdint>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
 #include <opencv2/core.hpp>
+
+#include "lapservo/geometry/camera.h"
+#include "lapservo/geometry/response.h"
+#include "lapservo/geometry/rigid3.h"
 
 namespace lapservo::internal {
 
@@ -33,5 +41,64 @@ std::string board_problem(const Board& board);
 /// there is no board. 8-bit BGR. `thorough` takes seconds where there is none. Throws nothing. A chessboard may be
 /// found turned by 180 degrees: its corners are the same.
 std::vector<BoardCorner> find_board(const Board& board, const cv::Mat& bgr, bool thorough);
+
+/// The edge between two squares, from one inner corner to the next: where a camera would show it.
+struct EdgePath {
+  Eigen::Vector3d from_m, to_m;                ///< on the board
+  Eigen::Vector2d from_px, along, normal;      ///< raw; unit vectors of the chord
+  double length_px = 0, sag_px = 0;            ///< the curve lies this far from the chord at its middle, along normal
+  std::array<double, 9> fraction_of_length{};  ///< of the points at 0, 1/8, ... 1 between the corners of the board
+
+  /// Signed distance to the curve along `normal`, and how far along the chord, in parts of it.
+  std::pair<double, double> place_of(const Eigen::Vector2d& raw_px) const;
+  /// The point of the board that is seen at so many parts of the chord.
+  Eigen::Vector3d point_m(double fraction) const;
+};
+
+/// A pixel near an edge: its distance to it along `normal`, parts of the chord, and its three values (b, g, r).
+struct EdgePixel {
+  double distance_px, fraction;
+  std::array<std::uint8_t, 3> value;
+};
+
+/// Pixels within reach of an edge and clear of its corners.
+struct EdgePixels {
+  EdgePath path;
+  double reach_px = 0;
+  std::vector<EdgePixel> pixels;
+};
+
+/// Edges between the corners that were found, where they are long enough to be measured and wholly in the image.
+/// `board_from`: the board's pose in the camera frame. Green's geometry; those of blue and red differ by far less than
+/// `reach_px`.
+std::vector<EdgePixels> edges_of(const Board& board, const std::vector<BoardCorner>& corners, const Camera& camera,
+                                 const Rigid3& camera_from_board, const cv::Mat& bgr);
+
+/// A straight blurred edge fitted to a channel's light.
+struct BoardEdgeFit {
+  double offset_px = 0, slope = 0;  ///< distance to the path at mean_fraction, and its change along the edge
+  double mean_fraction = 0, spread_fraction = 0;
+  double blur_px = 0;      ///< one sigma
+  double sigma_px = 0;     ///< of offset_px, by the pixels' scatter about the fit
+  int towards_bright = 0;  ///< 1 where `normal` points to the brighter square, else -1
+};
+
+/// nullopt where there is no such edge: too little contrast, saturated, or a fit that leaves it.
+std::optional<BoardEdgeFit> fit_edge(const EdgePixels& edge, int channel, const LightTable& light_of_value);
+
+/// A channel's encoded values (0 to 1) across an edge, from dark to bright, in steps of `profile_step_px` about the
+/// edge; NaN where there is none. Means of light, encoded again: noise comes before the response.
+struct BoardEdgeProfile {
+  std::vector<double> value, sigma;
+  std::vector<double> at_px, spread_px2;  ///< distances of a step's pixels: their mean and variance
+  double dark = 0, bright = 0;            ///< values of the squares beside it
+  double blur_px = 1;
+  double angle_rad = 0;  ///< between the edge and the nearer of rows and columns, 0 to pi/4
+};
+constexpr double profile_step_px = 0.5;
+
+/// The profile of an edge that was fitted in this channel; nullopt where it shows no two levels.
+std::optional<BoardEdgeProfile> profile_of(const EdgePixels& edge, const BoardEdgeFit& fit, int channel,
+                                           const Response& response);
 
 }  // namespace lapservo::internal

@@ -8,10 +8,9 @@
 #include <tuple>
 #include <utility>
 
-#include "lapservo/calibration/fit/linear_fit.h"
-#include "lapservo/calibration/fit/robust_scale.h"
-#include "lapservo/calibration/fit/solve_quietly.h"
+#include "lapservo/calibration/fit/ceres_fit.h"
 #include "lapservo/core/departures.h"
+#include "lapservo/core/statistics.h"
 #include "lapservo/geometry/rotation.h"
 
 namespace lapservo::internal {
@@ -186,43 +185,24 @@ Departures departures_at(ceres::Problem& problem, const FittedNumbers& fitted, c
 std::optional<std::pair<CameraSigmas, double>> sigmas_of(ceres::Problem& problem, const CameraUnknowns& c, double scale,
                                                          const FittedNumbers& fitted,
                                                          const Eigen::MatrixXd& by_faults) {
-  ceres::Covariance::Options options;
-  options.algorithm_type = ceres::SPARSE_QR;
-  ceres::Covariance covariance(options);
-  const std::vector<std::pair<const double*, const double*>> blocks{{&c.focal_px, &c.focal_px},
-                                                                    {&c.focal_px, &c.aspect},
-                                                                    {&c.aspect, &c.aspect},
-                                                                    {c.centre_px.data(), c.centre_px.data()},
-                                                                    {c.distortion.data(), c.distortion.data()},
-                                                                    {&c.k3, &c.k3},
-                                                                    {c.magnifications.data(), c.magnifications.data()}};
-  if (!covariance.Compute(blocks, &problem)) return std::nullopt;
-  bool finite = true;
-  const auto read = [&](const double* one, const double* other, Eigen::Index size) {
-    Eigen::MatrixXd block(size, size);
-    finite = finite && covariance.GetCovarianceBlock(one, other, block.data());
-    block *= scale * scale;
-    const auto row = fitted.column(one), column = fitted.column(other);
-    if (row && column) block += by_faults.block(*row, *column, size, size);
-    finite = finite && block.allFinite();
-    return block;
-  };
-  const double focal = read(&c.focal_px, &c.focal_px, 1)(0), focal_aspect = read(&c.focal_px, &c.aspect, 1)(0),
-               aspect = read(&c.aspect, &c.aspect, 1)(0), k3 = read(&c.k3, &c.k3, 1)(0);
-  const Eigen::MatrixXd centre = read(c.centre_px.data(), c.centre_px.data(), 2);
-  const Eigen::MatrixXd distortion = read(c.distortion.data(), c.distortion.data(), 4);
-  const Eigen::MatrixXd magnifications = read(c.magnifications.data(), c.magnifications.data(), 2);
-  if (!finite) return std::nullopt;
-  const auto sigma = [&](double variance) { return std::sqrt(std::max(0.0, variance)); };
-  CameraSigmas sigmas;
-  sigmas.fx_px = sigma(focal);
-  sigmas.fy_px =
-      sigma(c.aspect * c.aspect * focal + 2 * c.focal_px * c.aspect * focal_aspect + c.focal_px * c.focal_px * aspect);
-  sigmas.cx_px = sigma(centre(0, 0)), sigmas.cy_px = sigma(centre(1, 1));
-  for (Eigen::Index i = 0; i < 4; ++i) sigmas.distortion[static_cast<std::size_t>(i)] = sigma(distortion(i, i));
-  sigmas.distortion[4] = sigma(k3);
-  sigmas.blue = sigma(magnifications(0, 0)), sigmas.red = sigma(magnifications(1, 1));
-  return std::pair(sigmas, sigma(aspect));
+  const std::vector<const double*> blocks{&c.focal_px,         &c.aspect, c.centre_px.data(),
+                                          c.distortion.data(), &c.k3,     c.magnifications.data()};
+  const auto covariance = covariance_of(problem, blocks);
+  if (!covariance) return std::nullopt;
+  Eigen::MatrixXd all = scale * scale * *covariance;
+  all += fitted.part_of(by_faults, blocks);
+  if (!all.allFinite()) return std::nullopt;
+  const Eigen::VectorXd sigma = all.diagonal().cwiseMax(0).cwiseSqrt();
+  const double fy_variance =
+      c.aspect * c.aspect * all(0, 0) + 2 * c.focal_px * c.aspect * all(0, 1) + c.focal_px * c.focal_px * all(1, 1);
+  const CameraSigmas sigmas{sigma[0],
+                            std::sqrt(std::max(0.0, fy_variance)),
+                            sigma[2],
+                            sigma[3],
+                            {sigma[4], sigma[5], sigma[6], sigma[7], sigma[8]},
+                            sigma[9],
+                            sigma[10]};
+  return std::pair(sigmas, sigma[1]);
 }
 
 }  // namespace
@@ -258,12 +238,7 @@ std::optional<CameraAdjustment> adjust_camera(const Camera& start, const std::ve
       if (problem.HasParameterBlock(view.wider_px.data()))
         problem.SetManifold(view.wider_px.data(), new ceres::SubsetManifold(channels, fixed_channels));
 
-  ceres::Solver::Options solver;
-  solver.linear_solver_type = ceres::SPARSE_SCHUR;
-  solver.max_num_iterations = 50;
-  solver.function_tolerance = 1e-10;
-  ceres::Solver::Summary summary;
-  if (!solve_quietly(solver, problem, summary, at_iteration)) return std::nullopt;
+  if (!solve_quietly({ceres::SPARSE_SCHUR, 50, 1e-10}, problem, at_iteration).IsSolutionUsable()) return std::nullopt;
 
   CameraAdjustment result;
   result.camera = camera_of(camera, start);

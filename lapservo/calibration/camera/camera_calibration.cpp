@@ -9,12 +9,10 @@
 #include <fmt/ranges.h>
 #include <opencv2/calib3d.hpp>
 
-#include "lapservo/calibration/camera/board_edges.h"
-#include "lapservo/calibration/fit/some_of.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/core/rounded_sigma.h"
 #include "lapservo/core/statistics.h"
-#include "lapservo/geometry/invertible.h"
+#include "lapservo/geometry/field_of_view.h"
 #include "lapservo/geometry/rotation.h"
 
 namespace lapservo::internal {
@@ -305,9 +303,6 @@ std::string advice(const std::vector<BoardView>& views, const cv::Size& size) {
 CameraCalibration calibrate_camera(const Board& board, const std::vector<BoardView>& views, const Camera& start,
                                    const std::function<void(const std::string&)>& progress,
                                    const AtIteration& at_iteration) {
-  const auto told = [&](const std::string& what) {
-    if (progress) progress(what);
-  };
   CameraCalibration calibration;
   const cv::Size size = views.empty() ? cv::Size() : views.front().bgr.size();
   const auto refuse = [&](const std::string& why) {
@@ -316,7 +311,7 @@ CameraCalibration calibrate_camera(const Board& board, const std::vector<BoardVi
     return calibration;
   };
   if (views.size() < least_views) return refuse(fmt::format("{} views of the board are too few", views.size()));
-  told("first fit");
+  progress("first fit");
   Camera without = start;
   without.chromatic_aberration = {};
   auto fit = first_fit(board, views, without);
@@ -325,7 +320,7 @@ CameraCalibration calibrate_camera(const Board& board, const std::vector<BoardVi
   // Edges about the fit, and the fit about the edges.
   constexpr int last_round = 1;
   for (int round = 0; round <= last_round; ++round) {
-    told("edges in green");
+    progress("edges in green");
     const auto points = measured(board, views, *fit, false, false).points;
     if (std::ranges::all_of(points, [](const auto& view) { return view.empty(); }))
       return refuse("no edge between squares can be measured: they are overexposed, or narrower than some 14 px");
@@ -337,7 +332,7 @@ CameraCalibration calibrate_camera(const Board& board, const std::vector<BoardVi
   // Means are of light as the last round had it.
   constexpr int response_rounds = 2;
   for (int round = 0; round < response_rounds; ++round) {
-    told("response");
+    progress("response");
     const bool last = round + 1 == response_rounds;
     // More of them add no information.
     const auto response = fit_response(some_of(measured(board, views, *fit, false, true).profiles, last ? 600 : 300),
@@ -346,7 +341,7 @@ CameraCalibration calibrate_camera(const Board& board, const std::vector<BoardVi
     calibration.response = response;
     fit->camera.response = response->response;
   }
-  told("edges in all colours");
+  progress("edges in all colours");
   const MeasuredEdges edges = measured(board, views, *fit, true, false);
   fit = adjust_what_shows(*fit, edges, at_iteration);
   if (!fit) return refuse("the views are too alike to determine the camera");

@@ -67,8 +67,8 @@ struct CameraCalibration {
 
 /// Matrix, distortion, lateral chromatic aberration and response of the camera that took the views, all of one size.
 /// `start` gives the response to begin with. `progress` receives the finished steps.
-CameraCalibration calibrate_camera(const Board& board, const std::vector<BoardView>& views, const Camera& start,
-                                   const std::function<void(const std::string&)>& progress = {},
-                                   const AtIteration& at_iteration = {});
+CameraCalibration calibrate_camera(
+    const Board& board, const std::vector<BoardView>& views, const Camera& start,
+    const std::function<void(const std::string&)>& progress = [](const auto&) {}, const AtIteration& at_iteration = {});
 
 }  // namespace lapservo::internal

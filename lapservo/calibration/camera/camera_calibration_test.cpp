@@ -123,8 +123,7 @@ TEST(CalibrateCamera, TakesAUsualResponseUnlessEdgesSpeakAgainstIt) {
                         {1.2, "table", contrasty(4)}}) {
     Camera camera = small_camera();
     camera.response = c.response;
-    BoardScene scene;
-    scene.blur_px = c.blur_px, scene.falloff = 0;
+    const BoardScene scene{.falloff = 0, .blur_px = c.blur_px};
     const CameraCalibration found = calibrate_camera(board, views_of(scene, camera, 5, 310), {});
     ASSERT_TRUE(found.response) << found.refusal;
     const ResponseFit& fit = *found.response;
@@ -135,9 +134,8 @@ TEST(CalibrateCamera, TakesAUsualResponseUnlessEdgesSpeakAgainstIt) {
 }
 
 TEST(CalibrateCamera, TellsSharpeningFromTheResponse) {
-  Camera camera = small_camera();
-  BoardScene scene;
-  scene.sharpening = 0.5;
+  const Camera camera = small_camera();
+  const BoardScene scene{.sharpening = 0.5};
   const CameraCalibration found = calibrate_camera(board, views_of(scene, camera, 6, 90), {});
   expect_found(camera, found);
   ASSERT_TRUE(found.response);
@@ -196,8 +194,7 @@ TEST(CalibrateCamera, ReadsCharucoBoards) {
 #endif
   Camera camera = small_camera();
   camera.distortion = {};
-  BoardScene scene;
-  scene.columns = 7, scene.rows = 5;
+  const BoardScene scene{.columns = 7, .rows = 5};
   BoardViews views(charuco, 50);
   for (const Rigid3& pose : board_poses(scene, camera, 6, 190)) {
     // Pixel of the pattern to twice the image's.

@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "lapservo/calibration/calibrated_number.h"
 #include "lapservo/calibration/camera/camera_calibration.h"
 #include "lapservo/calibration/recording/frame_recording.h"
 #include "lapservo/vision/image/interlacing.h"

@@ -7,13 +7,12 @@
 #include <limits>
 #include <tuple>
 #include <type_traits>
-#include <utility>
 
 #include <Eigen/Core>
 #include <fmt/format.h>
 
 #include "lapservo/calibration/camera/response_curve.h"
-#include "lapservo/calibration/fit/solve_quietly.h"
+#include "lapservo/calibration/fit/ceres_fit.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/core/dense_matrix.h"
 #include "lapservo/core/rounded_sigma.h"
@@ -212,15 +211,8 @@ double difference(const Response& a, const Response& b, double low, double high)
 struct Named {
   std::string name;
   Response response;
-  double evidence = 0;  // its logarithm, less the table's
+  double evidence;  // its logarithm, less the table's
 };
-
-std::vector<Named> named_responses() {
-  std::vector<Named> all{{"srgb", {}}, {"rec709", {Response::Kind::rec709}}, {"linear", {Response::Kind::power, 1}}};
-  for (const double gamma : {1.8, 2.0, 2.2, 2.4})
-    all.push_back({fmt::format("gamma:{}", gamma), {Response::Kind::power, gamma}});
-  return all;
-}
 
 using CurveCovariance = Eigen::Matrix<double, curve_numbers, curve_numbers, Eigen::RowMajor>;
 
@@ -249,18 +241,12 @@ struct CurvePosterior {
 
 // The fit's own is that by all of the information, linear about it.
 std::optional<CurvePosterior> posterior_of(ceres::Problem& problem, const SharedUnknowns& shared, double part) {
-  ceres::Covariance::Options options;
-  options.algorithm_type = ceres::SPARSE_QR;
-  ceres::Covariance covariance(options);
-  const double* curve = shared.curve.data();
-  if (!covariance.Compute(std::vector<std::pair<const double*, const double*>>{{curve, curve}}, &problem))
-    return std::nullopt;
-  CurveCovariance fitted;
-  covariance.GetCovarianceBlock(curve, curve, fitted.data());
+  const auto fitted = covariance_of(problem, {shared.curve.data()});
+  if (!fitted) return std::nullopt;
   const UsualCurves usual = usual_curves();
   const Eigen::MatrixXd prior = product(usual.whitening.transpose(), usual.whitening);
   CurvePosterior posterior;
-  posterior.covariance = inverse_of_symmetric(part * inverse_of_symmetric(fitted) + (1 - part) * prior);
+  posterior.covariance = inverse_of_symmetric(part * inverse_of_symmetric(*fitted) + (1 - part) * prior);
   const ResponseCurve off = curve_of(shared) - usual.mean, pull = (1 - part) * (prior * off);
   const ResponseCurve back = posterior.covariance * pull;
   posterior.curve = curve_of(shared) - back;
@@ -304,10 +290,6 @@ class ProfileFit {
     }
     shared_.log_ratio = median(ratios);
     add_costs();
-    solver_.linear_solver_type = ceres::SPARSE_SCHUR;
-    solver_.max_num_iterations = 40;
-    solver_.function_tolerance = 1e-6;
-    solver_.num_threads = 1;  // the same to the last bit, every time
   }
 
   /// Mean square of values over their sigmas.
@@ -388,7 +370,8 @@ class ProfileFit {
     };
     fix(shared_.curve.data(), given_.response != nullptr);
     fix(&shared_.strength, !given_.sharpened), fix(&shared_.log_mask_px, !given_.sharpened);
-    return solve_quietly(solver_, problem_, summary_, at_iteration_);
+    summary_ = solve_quietly({ceres::SPARSE_SCHUR, 40}, problem_, at_iteration_);
+    return summary_.IsSolutionUsable();
   }
 
   const std::vector<BoardEdgeProfile>& profiles_;
@@ -398,7 +381,6 @@ class ProfileFit {
   std::vector<EdgeBlock> edges_;
   Given given_;
   ceres::Problem problem_;
-  ceres::Solver::Options solver_;
   ceres::Solver::Summary summary_;
 };
 
@@ -421,7 +403,7 @@ std::vector<Named> weigh_named(ProfileFit& profiles, const CurvePosterior& poste
   const double of_table =
       -part * (profiles.cost() - profiles.curve_cost()) - posterior.cost + log_volume(posterior.covariance);
   std::vector<Named> all;
-  for (const auto& [name, response, unweighed] : named_responses())
+  for (const auto& [name, response] : named_responses())
     if (const auto cost = profiles.cost_with(response))
       all.push_back({name, response, named_log_odds - part * *cost - of_table});
   return all;
@@ -450,6 +432,14 @@ void choose_response(ProfileFit& profiles, const CurvePosterior& posterior, doub
 
 }  // namespace
 
+std::vector<std::pair<std::string, Response>> named_responses() {
+  std::vector<std::pair<std::string, Response>> all{
+      {"srgb", {}}, {"rec709", {Response::Kind::rec709}}, {"linear", {Response::Kind::power, 1}}};
+  for (const double gamma : {1.8, 2.0, 2.2, 2.4})
+    all.push_back({fmt::format("gamma:{}", gamma), {Response::Kind::power, gamma}});
+  return all;
+}
+
 std::optional<ResponseFit> fit_response(const std::vector<BoardEdgeProfile>& profiles, const Response& start,
                                         bool try_named, const AtIteration& at_iteration) {
   constexpr std::size_t least_profiles = 50;
@@ -460,9 +450,8 @@ std::optional<ResponseFit> fit_response(const std::vector<BoardEdgeProfile>& pro
   fit.misfit = fitted.misfit();
   fit.sharpening = fitted.sharpened() ? fitted.shared().strength : 0;
   fit.sharpening_px = std::exp(fitted.shared().log_mask_px);
-  std::vector<double> darks, brights;
-  for (const BoardEdgeProfile& p : profiles) darks.push_back(p.dark), brights.push_back(p.bright);
-  fit.low = quantile(darks, 0.02), fit.high = quantile(brights, 0.98);
+  fit.low = quantile(values_of(profiles, &BoardEdgeProfile::dark), 0.02);
+  fit.high = quantile(values_of(profiles, &BoardEdgeProfile::bright), 0.98);
   const double part = independent_part(profiles) / std::pow(std::max(1.0, fit.misfit), 2);
   const auto posterior = posterior_of(fitted.problem(), fitted.shared(), part);
   if (!posterior) return std::nullopt;

@@ -1,15 +1,18 @@
 #pragma once
 
-#include <array>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
-#include "lapservo/calibration/camera/board_edges.h"
+#include "lapservo/calibration/camera/board.h"
 #include "lapservo/calibration/fit/at_iteration.h"
 #include "lapservo/geometry/response.h"
 
 namespace lapservo::internal {
+
+/// The usual responses, by their names in a rig.
+std::vector<std::pair<std::string, Response>> named_responses();
 
 struct ResponseFit {
   Response response;  ///< a named one unless the edges speak against it, else a table

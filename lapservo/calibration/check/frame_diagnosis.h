@@ -22,8 +22,8 @@ constexpr bool comes_by_compression(Status status) {
 }
 
 /// Why frames of a recording are damaged, show no instrument of a rig, or an instrument that misses the rig's RCM.
-/// Frames are added as they are tracked; a few of those without a result are kept and tried again in other readings
-/// (other_readings.h) when text() or cause() is called.
+/// Frames are added as they are tracked; a few of those without a result are kept and read otherwise when text() or
+/// cause() is called.
 class FrameDiagnosis {
  public:
   /// `deinterlaced`: one field of each frame is tracked.

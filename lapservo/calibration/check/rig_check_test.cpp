@@ -2,10 +2,10 @@
 
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include <gtest/gtest.h>
 
-#include "lapservo/sim/blood.h"
 #include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/renderer.h"
 #include "lapservo/sim/tissue.h"
@@ -100,13 +100,8 @@ TEST(RigEvidence, SearchesEachPictureWhole) {
   Rig rig = true_rig();
   MarkerSigmas& sigmas = rig.instruments[0].marker.sigmas;  // a print that was measured may show little of itself
   sigmas.bands_upper_m = sigmas.bands_lower_m = std::array{1e-5, 1e-5, 1e-5};
-  Random random(5);
-  const JointVector q = scenes::random_configuration(rig, 0, random);
-  ShaftModel shaft = shaft_of(rig.instruments[0]);
-  shaft.blotches = blood_over(shaft.marker, 0.6, random);
-  Renderer renderer(rig.camera, {shaft}, make_tissue(rig.camera.width_px, rig.camera.height_px, 5));
   RigEvidence evidence(rig, 0);
-  evidence.add(renderer.render({placement_of(rig.instruments[0], q)}, 5), 0);
+  evidence.add(scenes::BloodyMotion(rig, 0.6, 5, 1).frames[0], 0);
   EXPECT_EQ(evidence.count(Status::ok), 1);
 }
 
@@ -219,11 +214,9 @@ TEST_F(CheckRig, NamesDriftFirst) {
 }
 
 TEST_F(CheckRig, NamesBadLightFirst) {
-  RenderOptions options;
-  options.sensor.gains = Light::Constant(0.02F);
-  expect_first(found_out(rig, rendered(8, options), joints), "dark");
-  options.sensor.gains = Light::Constant(6);
-  expect_first(found_out(rig, rendered(8, options), joints), "overexposed");
+  for (const auto& [light, word] : {std::pair(0.02F, "dark"), {6.0F, "overexposed"}})
+    expect_first(found_out(rig, rendered(8, {.lighting = {}, .sensor = {.gains = Light::Constant(light)}}), joints),
+                 word);
 }
 
 TEST_F(CheckRig, NamesAWrongResponseFirst) {

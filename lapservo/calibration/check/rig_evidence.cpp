@@ -118,9 +118,7 @@ std::vector<TrackedPsi> RigEvidence::tracked_psi() const {
 PictureLight RigEvidence::picture() const {
   finish_all_but(0);
   if (pictures_.empty()) return {};
-  std::vector<double> values, clipped;
-  for (const PictureLight& light : pictures_) values.push_back(light.value), clipped.push_back(light.clipped);
-  return {median(values), median(clipped)};
+  return {median(values_of(pictures_, &PictureLight::value)), median(values_of(pictures_, &PictureLight::clipped))};
 }
 
 int RigEvidence::count(Status status) const {

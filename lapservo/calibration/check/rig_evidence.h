@@ -9,8 +9,7 @@
 #include <opencv2/core.hpp>
 
 #include "lapservo/calibration/check/arm_check.h"
-#include "lapservo/calibration/colour/light.h"
-#include "lapservo/calibration/colour/marker_response.h"
+#include "lapservo/calibration/colour/marker_light.h"
 #include "lapservo/calibration/marker/marker_calibration.h"
 #include "lapservo/calibration/registration/timed_pose.h"
 #include "lapservo/core/workers.h"

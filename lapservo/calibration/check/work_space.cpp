@@ -96,8 +96,8 @@ std::optional<double> sigma_at(Judge& judge, const Rigid3& shaft) {
 
 // Near and far of where the marker's middle was, where it was measured.
 std::vector<double> depths_of(const std::vector<TimedPose>& poses, double length_m) {
-  std::vector<double> depths_m;
-  for (const TimedPose& pose : poses) depths_m.push_back((pose.origin() + length_m / 2 * pose.axis()).z());
+  auto depths_m =
+      values_of(poses, [=](const TimedPose& pose) { return (pose.origin() + length_m / 2 * pose.axis()).z(); });
   std::sort(depths_m.begin(), depths_m.end());
   const std::size_t tenth = depths_m.size() / 10;
   return {depths_m[tenth], depths_m[depths_m.size() - 1 - tenth]};

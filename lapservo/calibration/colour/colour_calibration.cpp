@@ -7,11 +7,11 @@
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
 
-#include "lapservo/calibration/colour/light.h"
-#include "lapservo/calibration/colour/marker_response.h"
-#include "lapservo/calibration/fit/robust_scale.h"
+#include "lapservo/calibration/check/frame_diagnosis.h"
+#include "lapservo/calibration/colour/marker_light.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/core/departures.h"
+#include "lapservo/core/rounded_sigma.h"
 #include "lapservo/core/statistics.h"
 #include "lapservo/vision/colour/colour_classes.h"
 #include "lapservo/vision/tracker.h"
@@ -194,8 +194,7 @@ MeasuredHues measure(const Rig& rig, std::size_t instrument, const std::vector<c
   measured.clipped = median(clipped);
   std::array<double, 3> middle_deg, scatter_deg;
   for (std::size_t band = 0; band < 3; ++band) {
-    std::vector<double> beyond_deg;
-    for (const FrameHues& frame : hues) beyond_deg.push_back(frame.beyond_deg[band]);
+    auto beyond_deg = values_of(hues, [=](const FrameHues& frame) { return frame.beyond_deg[band]; });
     middle_deg[band] = median(std::vector(beyond_deg));
     measured.hues_deg[band] = std::fmod(marker.hues_deg[band] + middle_deg[band] + 360, 360.0);
     for (double& beyond : beyond_deg) beyond -= middle_deg[band];
@@ -259,23 +258,20 @@ void SpreadFrames::add(const cv::Mat& bgr) {
 
 ColourCalibration calibrate_colour(const Rig& rig, std::size_t instrument, const std::vector<cv::Mat>& frames,
                                    bool keep_response, const std::function<void(const std::string&)>& progress) {
-  const auto say = [&](const std::string& what) {
-    if (progress) progress(what);
-  };
   ColourCalibration calibration;
   if (frames.size() < min_colour_frames)
     return calibration.refusal = fmt::format("{} frames, at least {} are needed", frames.size(), min_colour_frames),
            calibration;
   const Instrument& of = rig.instruments[instrument];
-  say("the rig's hues");
+  progress("the rig's hues");
   calibration.found_before = found_in(with_hues(rig, instrument, of.marker.hues_deg), instrument, frames, 1);
-  say("which hues move");
+  progress("which hues move");
   std::array<double, 3> hues_deg = best_start(rig, instrument, frames);
   MarkerResponse response(rig.camera);
   MeasuredHues measured;
   constexpr int rounds = 2;
   for (int round = 0; round < rounds; ++round) {
-    say("the bands' hues");
+    progress("the bands' hues");
     measured =
         measure(with_hues(rig, instrument, hues_deg), instrument, frames, round + 1 == rounds ? &response : nullptr);
     hues_deg = measured.hues_deg;
@@ -284,7 +280,7 @@ ColourCalibration calibrate_colour(const Rig& rig, std::size_t instrument, const
   if (!calibration.refusal.empty()) return calibration;
   calibration.hues_deg = hues_deg, calibration.sigma_hues_deg = measured.sigma_deg;
   calibration.faults = measured.faults;
-  say("the response");
+  progress("the response");
   if (const auto result = response.result()) {
     if (!keep_response) calibration.response = result->better;
     calibration.response_found =
@@ -320,7 +316,7 @@ cv::Mat segmentation_picture(const cv::Mat& bgr, const Rig& rig) {
     for (std::size_t band = 0; band < 3; ++band) {
       cv::Mat paint(1, 1, CV_8UC3, cv::Scalar(rig.instruments[i].marker.hues_deg[band] / 2, 230, 255));
       cv::cvtColor(paint, paint, cv::COLOR_HSV2BGR);
-      paints[classes.of_band(i, band)] = paint.at<cv::Vec3b>(0, 0);
+      paints[classes.of_bands(i)[band]] = paint.at<cv::Vec3b>(0, 0);
     }
   cv::Mat picture;
   cv::cvtColor(bgr, picture, cv::COLOR_BGR2GRAY);
@@ -331,6 +327,53 @@ cv::Mat segmentation_picture(const cv::Mat& bgr, const Rig& rig) {
       if (const auto colour = classes(bgr.ptr(v) + 3 * static_cast<std::ptrdiff_t>(u)))
         picture.at<cv::Vec3b>(v, u) = paints[colour];
   return picture;
+}
+
+ColourMeasurement measure_colour(const Rig& rig, std::size_t instrument, const FrameRecording& recording,
+                                 bool replace_response, const JobWatch& watch) {
+  constexpr std::size_t most = 48;
+  SpreadFrames kept(most);
+  const bool live = recording.source.kind() == FrameSource::Kind::live;
+  ColourMeasurement measured;
+  measured.read = read_frames(recording, rig, live ? 10 : 1, watch, [&](const cv::Mat& bgr, double) {
+    kept.add(bgr);
+    return fmt::format(", {} kept", kept.frames().size());
+  });
+  if (measured.read.stopped) return measured.calibration.refusal = "stopped", measured;
+  measured.frames = kept.frames().size();
+  const bool is_named = recording.source.is_srgb();
+  const bool keep_response = is_named || (!replace_response && rig.camera.response.sigma.has_value());
+  int step = 0;
+  measured.calibration = calibrate_colour(rig, instrument, kept.frames(), keep_response, [&](const std::string& what) {
+    watch.tell(std::nullopt, ++step, ": " + what);
+  });
+  if (is_named) measured.calibration.response_found = "as it is: the recording names how it encodes light";
+  if (!measured.calibration.refusal.empty() &&
+      2 * measured.calibration.found_before < static_cast<int>(measured.frames)) {
+    FrameDiagnosis diagnosis(rig);
+    for (const cv::Mat& bgr : kept.frames()) diagnosis.add(bgr, {});
+    measured.calibration.refusal += diagnosis.cause();
+  }
+  return measured;
+}
+
+std::vector<CalibratedNumber> calibrated_numbers(const Marker& before, const ColourCalibration& calibration) {
+  std::vector<CalibratedNumber> numbers;
+  for (std::size_t i = 0; i < 3; ++i)
+    numbers.push_back({fmt::format("hues_deg[{}] [deg]", i), before.hues_deg[i], calibration.hues_deg[i],
+                       calibration.sigma_hues_deg[i]});
+  return numbers;
+}
+
+Rig with_colour(Rig rig, std::size_t instrument, const ColourCalibration& calibration) {
+  Marker& marker = rig.instruments[instrument].marker;
+  marker.sigmas.hues_deg.emplace();
+  for (std::size_t i = 0; i < 3; ++i) {
+    marker.hues_deg[i] = std::round(100 * calibration.hues_deg[i]) / 100;
+    (*marker.sigmas.hues_deg)[i] = rounded_sigma(calibration.sigma_hues_deg[i]);
+  }
+  if (calibration.response) rig.camera.response = *calibration.response, rig.camera_file.clear();
+  return rig;
 }
 
 }  // namespace lapservo::internal

@@ -9,8 +9,7 @@
 
 #include <opencv2/core.hpp>
 
-#include "lapservo/geometry/response.h"
-#include "lapservo/rig/rig.h"
+#include "lapservo/calibration/recording/frame_recording.h"
 
 namespace lapservo::internal {
 
@@ -39,11 +38,31 @@ struct ColourCalibration {
 /// The hues of a mounted marker's bands as the camera has them, and how it encodes light, from frames of it in motion
 /// (8-bit BGR of the rig's size). The rig's hues may be so wrong that it is not found at all: up to 60 degrees each.
 /// With keep_response the rig's stays, whatever the frames say: to a marker, sharpening looks like another response.
-ColourCalibration calibrate_colour(const Rig& rig, std::size_t instrument, const std::vector<cv::Mat>& frames,
-                                   bool keep_response = false,
-                                   const std::function<void(const std::string&)>& progress = {});
+ColourCalibration calibrate_colour(
+    const Rig& rig, std::size_t instrument, const std::vector<cv::Mat>& frames, bool keep_response = false,
+    const std::function<void(const std::string&)>& progress = [](const auto&) {});
 
 /// The frame in grey, with what is one of the rig's colours painted in its hue.
 cv::Mat segmentation_picture(const cv::Mat& bgr, const Rig& rig);
+
+/// Colours, measured, and in how many frames.
+struct ColourMeasurement {
+  ColourCalibration calibration;  ///< or its refusal
+  std::size_t frames = 0;
+  FramesRead read;
+};
+
+/// Calibrates by a marker in motion, a live camera's until it is stopped. A response that calibrate camera measured
+/// stays without `replace_response`, and any that images are read by as they say themselves. Throws InputError as
+/// read_frames().
+ColourMeasurement measure_colour(const Rig& rig, std::size_t instrument, const FrameRecording& recording,
+                                 bool replace_response, const JobWatch& watch);
+
+/// The hues, in degrees.
+std::vector<CalibratedNumber> calibrated_numbers(const Marker& before, const ColourCalibration& calibration);
+
+/// The rig with what was measured: hues to a hundredth of a degree. A response that is another can't go into a camera's
+/// own file, which other rigs may name: the camera stands in the rig then.
+Rig with_colour(Rig rig, std::size_t instrument, const ColourCalibration& calibration);
 
 }  // namespace lapservo::internal

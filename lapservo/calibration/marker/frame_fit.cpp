@@ -2,39 +2,49 @@
 
 #include <algorithm>
 #include <ceres/ceres.h>
+#include <ceres/normal_prior.h>
 #include <cmath>
 
-#include "lapservo/calibration/fit/robust_scale.h"
-#include "lapservo/calibration/fit/solve_quietly.h"
+#include "lapservo/calibration/fit/ceres_fit.h"
 #include "lapservo/core/dense_matrix.h"
+#include "lapservo/core/statistics.h"
 
 namespace lapservo::internal {
 namespace {
 
-// Residuals and their derivatives at one x, which all frames' cost functions read.
-struct Linearisation {
+// Residuals and their derivatives at x, which all frames' cost functions read.
+struct Linearisation : ceres::EvaluationCallback {
+  Linearisation(const FrameResiduals& of, const std::vector<Unknown>& numbers, const Eigen::VectorXd& starts,
+                std::size_t held_numbers)
+      : model(of),
+        unknowns(numbers),
+        held(starts.tail(static_cast<Eigen::Index>(held_numbers))),
+        x(starts.head(starts.size() - held.size())),
+        residuals(model(starts)) {}
+
   const FrameResiduals& model;
   const std::vector<Unknown>& unknowns;  // those that are fitted, then those that are held
-  const Eigen::VectorXd& held;
+  const Eigen::VectorXd held;
+  Eigen::VectorXd x;
   Eigen::MatrixXd residuals;
   std::vector<Eigen::MatrixXd> slopes;  // one a number that is fitted, as residuals
 
-  void update(const Eigen::VectorXd& x, bool with_slopes) {
-    residuals = model(with_held(x));
+  void PrepareForEvaluation(bool with_slopes, bool) override {
+    residuals = model(with_held());
     if (!with_slopes) return;
     slopes.clear();
-    for (Eigen::Index i = 0; i < x.size(); ++i) slopes.push_back(slope(x, i));
+    for (Eigen::Index i = 0; i < x.size(); ++i) slopes.push_back(slope(i));
   }
 
-  Eigen::VectorXd with_held(const Eigen::VectorXd& x) const {
+  Eigen::VectorXd with_held() const {
     Eigen::VectorXd all(x.size() + held.size());
     all << x, held;
     return all;
   }
 
-  Eigen::MatrixXd slope(const Eigen::VectorXd& x, Eigen::Index of) const {
+  Eigen::MatrixXd slope(Eigen::Index of) const {
     const double size = unknowns[static_cast<std::size_t>(of)].step;
-    const Eigen::VectorXd all = with_held(x), step = size * Eigen::VectorXd::Unit(all.size(), of);
+    const Eigen::VectorXd all = with_held(), step = size * Eigen::VectorXd::Unit(all.size(), of);
     return (model(all + step) - model(all - step)) / (2 * size);
   }
 
@@ -46,22 +56,12 @@ struct Linearisation {
   }
 };
 
-class Update : public ceres::EvaluationCallback {
- public:
-  Update(Linearisation& at, const Eigen::VectorXd& x) : at_(at), x_(x) {}
-  void PrepareForEvaluation(bool with_jacobians, bool) override { at_.update(x_, with_jacobians); }
-
- private:
-  Linearisation& at_;
-  const Eigen::VectorXd& x_;
-};
-
 class FrameCost : public ceres::CostFunction {
  public:
-  FrameCost(const Linearisation& at, Eigen::Index frame, const Eigen::VectorXd& weights, int numbers)
+  FrameCost(const Linearisation& at, Eigen::Index frame, const Eigen::VectorXd& weights)
       : at_(at), frame_(frame), weights_(weights) {
     set_num_residuals(static_cast<int>(weights.size()));
-    mutable_parameter_block_sizes()->push_back(numbers);
+    mutable_parameter_block_sizes()->push_back(static_cast<int>(at.x.size()));
   }
   bool Evaluate(double const* const*, double* residuals, double** jacobians) const override {
     using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
@@ -78,25 +78,6 @@ class FrameCost : public ceres::CostFunction {
   const Eigen::VectorXd& weights_;
 };
 
-// Prior of the numbers: their size in their standard deviations.
-class PriorCost : public ceres::CostFunction {
- public:
-  explicit PriorCost(const Eigen::VectorXd& inverse_sigmas) : inverse_sigmas_(inverse_sigmas) {
-    set_num_residuals(static_cast<int>(inverse_sigmas.size()));
-    mutable_parameter_block_sizes()->push_back(static_cast<int>(inverse_sigmas.size()));
-  }
-  bool Evaluate(double const* const* x, double* residuals, double** jacobians) const override {
-    const Eigen::Index n = inverse_sigmas_.size();
-    Eigen::Map<Eigen::VectorXd>(residuals, n) =
-        inverse_sigmas_.cwiseProduct(Eigen::Map<const Eigen::VectorXd>(x[0], n));
-    if (jacobians && jacobians[0]) Eigen::Map<Eigen::MatrixXd>(jacobians[0], n, n) = inverse_sigmas_.asDiagonal();
-    return true;
-  }
-
- private:
-  const Eigen::VectorXd& inverse_sigmas_;
-};
-
 Eigen::VectorXd inverse_priors(const std::vector<Unknown>& unknowns, Eigen::Index fitted) {
   Eigen::VectorXd inverse(fitted);
   for (Eigen::Index i = 0; i < fitted; ++i) {
@@ -111,23 +92,19 @@ double loss_scale(Eigen::Index channels) {
   return 2.5 * std::sqrt(static_cast<double>(channels));
 }
 
-bool solve(Linearisation& at, Eigen::VectorXd& x, const Eigen::VectorXd& weights, const AtIteration& at_iteration) {
-  Update update(at, x);
+bool solve(Linearisation& at, const Eigen::VectorXd& weights, const AtIteration& at_iteration) {
   ceres::Problem::Options options;
-  options.evaluation_callback = &update;
+  options.evaluation_callback = &at;
   ceres::CauchyLoss loss(loss_scale(weights.size()));
   options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
   ceres::Problem problem(options);
   for (Eigen::Index i = 0; i < at.residuals.cols(); ++i)
-    problem.AddResidualBlock(new FrameCost(at, i, weights, static_cast<int>(x.size())), &loss, x.data());
-  const Eigen::VectorXd priors = inverse_priors(at.unknowns, x.size());
-  problem.AddResidualBlock(new PriorCost(priors), nullptr, x.data());
-  ceres::Solver::Options solver;
-  solver.linear_solver_type = ceres::DENSE_NORMAL_CHOLESKY;
-  solver.max_num_iterations = 100;
-  solver.function_tolerance = 1e-12;  // what priors alone hold costs next to nothing
-  ceres::Solver::Summary summary;
-  return solve_quietly(solver, problem, summary, at_iteration) && x.allFinite();
+    problem.AddResidualBlock(new FrameCost(at, i, weights), &loss, at.x.data());
+  const Eigen::VectorXd priors = inverse_priors(at.unknowns, at.x.size());
+  problem.AddResidualBlock(new ceres::NormalPrior(priors.asDiagonal(), Eigen::VectorXd::Zero(priors.size())), nullptr,
+                           at.x.data());
+  const SolverChoice solver{ceres::DENSE_NORMAL_CHOLESKY, 100, 1e-12};  // what priors alone hold costs next to nothing
+  return solve_quietly(solver, problem, at_iteration).IsSolutionUsable() && at.x.allFinite();
 }
 
 Eigen::VectorXd robust_scales(const Eigen::MatrixXd& residuals) {
@@ -178,9 +155,8 @@ std::optional<Covariances> covariances(const Linearisation& at, const Eigen::Vec
 }
 
 // By the numbers that are held.
-Departures departures_at(const Linearisation& at, const Eigen::VectorXd& x, const Eigen::VectorXd& weights,
-                         std::size_t alike_frames) {
-  const Eigen::Index channels = at.residuals.rows(), frames = at.residuals.cols(), numbers = x.size(),
+Departures departures_at(const Linearisation& at, const Eigen::VectorXd& weights, std::size_t alike_frames) {
+  const Eigen::Index channels = at.residuals.rows(), frames = at.residuals.cols(), numbers = at.x.size(),
                      rows = channels * frames;
   const double scale = loss_scale(channels);
   LinearFit fit;
@@ -196,11 +172,11 @@ Departures departures_at(const Linearisation& at, const Eigen::VectorXd& x, cons
   }
   fit.groups.push_back(rows);
   const Eigen::VectorXd priors = inverse_priors(at.unknowns, numbers);
-  jacobian.bottomRows(numbers) = priors.asDiagonal(), fit.residuals.tail(numbers) = priors.cwiseProduct(x);
+  jacobian.bottomRows(numbers) = priors.asDiagonal(), fit.residuals.tail(numbers) = priors.cwiseProduct(at.x);
   fit.jacobian = jacobian.sparseView();
   Eigen::MatrixXd slopes = Eigen::MatrixXd::Zero(rows + numbers, at.held.size());
   for (Eigen::Index k = 0; k < slopes.cols(); ++k)
-    slopes.col(k).head(rows) = weighed.cwiseProduct(at.slope(x, numbers + k)).reshaped();
+    slopes.col(k).head(rows) = weighed.cwiseProduct(at.slope(numbers + k)).reshaped();
   return departures_of(fit, slopes);
 }
 
@@ -216,15 +192,13 @@ std::optional<FrameFit> fit_frames(const FrameResiduals& residuals, const std::v
                                    std::size_t alike_frames, const AtIteration& at_iteration, std::size_t held) {
   Eigen::VectorXd starts(static_cast<Eigen::Index>(unknowns.size()));
   for (std::size_t i = 0; i < unknowns.size(); ++i) starts[static_cast<Eigen::Index>(i)] = unknowns[i].start;
-  const Eigen::VectorXd stays = starts.tail(static_cast<Eigen::Index>(held));
-  Eigen::VectorXd x = starts.head(starts.size() - stays.size());
-  Linearisation at{residuals, unknowns, stays, residuals(starts), {}};
+  Linearisation at(residuals, unknowns, starts, held);
   if (!at.residuals.allFinite()) return std::nullopt;
   Eigen::VectorXd scales = robust_scales(at.residuals);
   for (int round = 0; round < 6; ++round) {
     const Eigen::VectorXd weights = scales.cwiseInverse();
-    if (!solve(at, x, weights, at_iteration)) return std::nullopt;
-    at.update(x, true);
+    if (!solve(at, weights, at_iteration)) return std::nullopt;
+    at.PrepareForEvaluation(true, true);
     const Eigen::VectorXd next = robust_scales(at.residuals);
     const bool settled = ((next - scales).cwiseAbs().array() < 0.01 * scales.array()).all();
     scales = next;
@@ -232,12 +206,8 @@ std::optional<FrameFit> fit_frames(const FrameResiduals& residuals, const std::v
   }
   const auto sigma = covariances(at, scales.cwiseInverse(), alike_frames);
   if (!sigma || !sigma->scattered.allFinite() || !sigma->independent.allFinite()) return std::nullopt;
-  return FrameFit{x,
-                  sigma->scattered,
-                  sigma->independent,
-                  at.residuals,
-                  scales,
-                  departures_at(at, x, scales.cwiseInverse(), alike_frames)};
+  return FrameFit{at.x,         sigma->scattered, sigma->independent,
+                  at.residuals, scales,           departures_at(at, scales.cwiseInverse(), alike_frames)};
 }
 
 }  // namespace lapservo::internal

@@ -10,7 +10,6 @@
 
 #include "lapservo/calibration/fit/at_iteration.h"
 #include "lapservo/calibration/marker/marker_survey.h"
-#include "lapservo/calibration/marker/print_shape.h"
 #include "lapservo/rig/rig.h"
 
 namespace lapservo::internal {

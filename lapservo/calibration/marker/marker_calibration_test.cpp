@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "lapservo/calibration/marker/print_adjustment.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/testing/has.h"
 #include "lapservo/testing/scenes.h"
@@ -34,8 +35,7 @@ KeyFrames turned(const Rig& nominal, const Marker& print, const Turn& turn) {
   real.instruments[0].marker = print;
   Random random(4);
   const JointVector start = scenes::random_configuration(nominal, 0, random);
-  RenderOptions options;
-  options.sensor.blur_px = turn.blur_px;
+  const RenderOptions options{.lighting = {}, .sensor = {.blur_px = turn.blur_px}};
   KeyFrames key_frames(nominal, 0);
   for (int i = 0; i < turn.frames; ++i) {
     const double fraction = static_cast<double>(i) / turn.frames;

@@ -1,14 +1,40 @@
 #include "lapservo/calibration/marker/marker_measurement.h"
 
+#include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "lapservo/calibration/check/frame_diagnosis.h"
-#include "lapservo/calibration/registration/seam_registration.h"
+#include "lapservo/core/angles.h"
 #include "lapservo/core/error.h"
+#include "lapservo/core/statistics.h"
+#include "lapservo/kinematics/rcm_kinematics.h"
+#include "lapservo/rig/joint_conversion.h"
 
 namespace lapservo::internal {
+namespace {
+
+constexpr std::size_t min_seam_frames = 8;
+
+std::optional<double> psi_at(const JointRecording& recording, const Joints& joints, double time_s) {
+  const auto at = recording.at(time_s);
+  return at ? std::optional(q_from_joints(joints, Eigen::Vector4d(at->data()))[3]) : std::nullopt;
+}
+
+// psi in the RCM's azimuths of a shaft in a free pose: its axis as theta and phi have it, its turn about that.
+double psi_of(const ShaftPose& pose, const Rigid3& camera_from_rcm) {
+  const Eigen::Matrix3d axes =
+      (camera_from_rcm.rotation.conjugate() * pose.camera_from_unrolled.rotation).toRotationMatrix();
+  const Eigen::Vector3d axis = axes.col(2);
+  const double theta_rad = std::atan2(axis.y(), axis.x()), phi_rad = std::atan2(axis.head<2>().norm(), axis.z());
+  const Eigen::Matrix3d unrolled = rcm_from_unrolled({theta_rad, phi_rad, 0, 0}).rotation.toRotationMatrix();
+  const Eigen::Vector3d x = unrolled.transpose() * axes.col(0);
+  return pose.psi_rad + std::atan2(x.y(), x.x());
+}
+
+}  // namespace
 
 MarkerMeasurement measure_marker(const Rig& rig, std::size_t index, const FrameRecording& recording,
                                  const std::optional<JointsOfTurn>& joints, const JobWatch& watch) {
@@ -73,6 +99,51 @@ std::vector<CalibratedNumber> calibrated_numbers(const Marker& before, const Mar
   add("gap_rad [mrad]", before.gap_rad, after.gap_rad, sigmas.gap_rad.value());
   if (with_seam) add("seam_rad [mrad]", before.seam_rad, after.seam_rad, sigmas.seam_rad.value());
   return numbers;
+}
+
+SeamRegistration register_seam(const Instrument& instrument, const MarkerCalibration& calibration,
+                               const JointRecording& recording) {
+  SeamRegistration result;
+  const Marker& marker = calibration.marker;
+  std::vector<double> differences;
+  double first_s = 1e300, last_s = -1e300;
+  for (const KeyFrame& frame : calibration.key_frames) {
+    const double time_s = frame.time_s - instrument.image_delay_s.value_or(0);
+    first_s = std::min(first_s, time_s), last_s = std::max(last_s, time_s);
+    if (const auto psi_rad = psi_at(recording, instrument.joints.value(), time_s))
+      differences.push_back(psi_of(frame.sighting.unknowns.pose(), instrument.camera_from_rcm.value()) - *psi_rad);
+  }
+  result.frames = differences.size();
+  if (differences.size() < min_seam_frames) {
+    result.refusal = fmt::format(
+        "{} frames lie within the recording of the joints, at least {} are needed: the frames run from {:.2f} to "
+        "{:.2f} s, the recording from {:.2f} to {:.2f} s",
+        differences.size(), min_seam_frames, first_s, last_s, recording.time_s.front(), recording.time_s.back());
+    return result;
+  }
+  // About the direction of most, then the median, then the mean of what is near it.
+  double sine = 0, cosine = 0;
+  for (const double d : differences) sine += std::sin(d), cosine += std::cos(d);
+  const double about = std::atan2(sine, cosine);
+  for (double& d : differences) d = wrap_pi(d - about);
+  const double middle = median(differences);
+  std::vector<double> sizes;
+  for (const double d : differences) sizes.push_back(std::abs(d - middle));
+  const double scale = std::max(1e-4, 1.4826 * median(sizes));
+  double sum = 0, squares = 0, count = 0;
+  for (const double d : differences)
+    if (std::abs(d - middle) < 3 * scale) sum += d, squares += d * d, ++count;
+  const double mean = sum / count, variance = std::max(0.0, squares / count - mean * mean);
+  constexpr double widest_rad = 0.2;
+  if (scale > widest_rad) {
+    result.refusal =
+        "the joints do not turn as the marker does: check joints.sign, the recording's clock and image_delay_s";
+    return result;
+  }
+  // A pose was found with marker.seam_rad: what psi is too large by, the seam lies farther.
+  result.seam_rad = wrap_pi(marker.seam_rad + about + mean);
+  result.sigma_rad = std::sqrt(variance / std::max(1.0, count - 1));
+  return result;
 }
 
 }  // namespace lapservo::internal

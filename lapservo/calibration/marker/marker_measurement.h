@@ -5,7 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "lapservo/calibration/calibrated_number.h"
 #include "lapservo/calibration/marker/marker_calibration.h"
 #include "lapservo/calibration/recording/frame_recording.h"
 #include "lapservo/calibration/recording/joint_recording.h"
@@ -35,5 +34,17 @@ void expect_registration(const Instrument& instrument, const std::string& rig, c
 
 /// In mm and mrad.
 std::vector<CalibratedNumber> calibrated_numbers(const Marker& before, const Marker& after, bool with_seam);
+
+/// Where the seam lies on the instrument.
+struct SeamRegistration {
+  std::string refusal;  ///< the reason why it is not observable; empty when it is
+  double seam_rad = 0, sigma_rad = 0;
+  std::size_t frames = 0;  ///< within the recording
+};
+
+/// The seam by which the poses of the calibrated marker agree with the joints, on average, the rig's camera_from_rcm,
+/// joints and image_delay_s (0 when it has none) taken for right.
+SeamRegistration register_seam(const Instrument& instrument, const MarkerCalibration& calibration,
+                               const JointRecording& recording);
 
 }  // namespace lapservo::internal

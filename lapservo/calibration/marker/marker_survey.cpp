@@ -60,7 +60,7 @@ std::optional<Sighting> sighting_of(const Scene& scene, const PoseUnknowns& unkn
 // The fine fit where it settles, else the coarse one.
 std::optional<Sighting> refined(const Scene& scene, const LightImage& light, const CoarseFit& coarse,
                                 const EdgeBlur& blur, const CameraDeparture& departure) {
-  const FineFit fine = fit_finely(scene, light, coarse.unknowns, blur, {.departure = departure});
+  const FineFit fine = fit_finely(scene, light, coarse.unknowns, {.blur = blur, .departure = departure});
   if (fine.converged)
     if (auto sighting = sighting_of(scene, fine.as_the_rig_says, fine.blur, true, fine.departure)) return sighting;
   return sighting_of(scene, coarse.unknowns, blur, false, departure);
@@ -185,9 +185,8 @@ ViewMeasurements ViewMeasurer::measure(const MarkerView& view, const Marker& mar
   };
   measured.edges = edges_in(scene, light);
   if (reach.ask_processing)
-    measured.processing =
-        find_processing(light, measured.edges.all, glance_at(light, measured.edges.all), sighting.blur.boundaries_px(),
-                        reach.only_video ? expected_video : expected_picture);
+    measured.processing = find_processing(light, measured.edges.all, sighting.blur.boundaries_px(),
+                                          reach.only_video ? expected_video : expected_picture);
   const auto& found = measured.processing.edges;
   const auto processing = found ? std::optional(found->processing) : std::nullopt;
   const auto seam_by = [&](const LightImage* grey) {
@@ -214,7 +213,8 @@ std::optional<Sighting> ViewMeasurer::settled(const MarkerView& view, const Mark
   const ImageView image(view.bgr);
   const LightImage light(image, light_, ChannelGeometry(view.camera));
   const Scene scene{image, view.camera, classes_, marker, bands_};
-  const FineFit fine = fit_finely(scene, light, sighting.unknowns, sighting.blur, {.departure = sighting.departure});
+  const FineFit fine =
+      fit_finely(scene, light, sighting.unknowns, {.blur = sighting.blur, .departure = sighting.departure});
   return fine.converged ? sighting_of(scene, fine.as_the_rig_says, fine.blur, true, fine.departure) : std::nullopt;
 }
 

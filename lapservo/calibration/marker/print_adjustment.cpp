@@ -1,16 +1,16 @@
 #include "lapservo/calibration/marker/print_adjustment.h"
 
 #include <algorithm>
-#include <array>
 #include <ceres/ceres.h>
 #include <cmath>
 #include <cstddef>
 #include <utility>
 
-#include "lapservo/calibration/fit/linear_fit.h"
-#include "lapservo/calibration/fit/robust_scale.h"
-#include "lapservo/calibration/fit/solve_quietly.h"
+#include "lapservo/calibration/fit/ceres_fit.h"
 #include "lapservo/core/dense_matrix.h"
+#include "lapservo/core/rounded_sigma.h"
+#include "lapservo/core/statistics.h"
+#include "lapservo/marker/sensitivity.h"
 #include "lapservo/vision/model/common_errors.h"
 
 namespace lapservo::internal {
@@ -233,13 +233,11 @@ double noise_beyond_usual(double sigma_px) {
 
 // As the tracker has it, in all frames alike.
 double common_doubt_scale(const std::vector<ViewMeasurements>& frames, double edges_px) {
-  std::vector<double> blurs_px, biases_px;
-  for (const ViewMeasurements& frame : frames) {
-    blurs_px.push_back(frame.blur_px);
-    biases_px.push_back(Eigen::Map<const Eigen::Vector4d>(frame.bias_px.data()).norm() / 2);
-  }
-  if (blurs_px.empty()) return 1;
-  return doubt_scale(edges_px, median(blurs_px), median(biases_px));
+  if (frames.empty()) return 1;
+  return doubt_scale(edges_px, median(values_of(frames, &ViewMeasurements::blur_px)),
+                     median(values_of(frames, [](const ViewMeasurements& frame) {
+                       return Eigen::Map<const Eigen::Vector4d>(frame.bias_px.data()).norm() / 2;
+                     })));
 }
 
 // Effects of the fixed common errors, at one sigma of their prior.
@@ -316,20 +314,14 @@ PrintDepartures departures_at(ceres::Problem& problem, const std::vector<ViewMea
     return fault.kind == PrintFault::Kind::slips && std::abs(fault.size) < least_edge_m;
   });
   if (departures.seen.empty()) return result;
-  const Eigen::MatrixXd covariance = departures.by_seen + departures.by_instead;
-  for (Eigen::Index i = 0; i < print_numbers; ++i)
-    for (Eigen::Index j = 0; j < print_numbers; ++j) {
-      const auto row = numbers.column(print[static_cast<std::size_t>(i)]),
-                 column = numbers.column(print[static_cast<std::size_t>(j)]);
-      if (row && column) result.covariance(i, j) = covariance(*row, *column);
-    }
+  result.covariance = numbers.part_of(departures.by_seen + departures.by_instead, {print.begin(), print.end()});
   return result;
 }
 
 // The print's; the common errors count as they were before the fit.
-std::optional<PrintCovariance> covariance_of(ceres::Problem& problem, SharedUnknowns& shared,
-                                             const std::vector<TakenForZero>& errors, double noise_scale,
-                                             const PrintCovariance& by_faults) {
+std::optional<PrintCovariance> print_covariance(ceres::Problem& problem, SharedUnknowns& shared,
+                                                const std::vector<TakenForZero>& errors, double noise_scale,
+                                                const PrintCovariance& by_faults) {
   const auto numbers = shared.print();
   std::vector<const double*> unknowns(numbers.begin(), numbers.end());
   Eigen::VectorXd prior(static_cast<Eigen::Index>(errors.size()));
@@ -337,16 +329,11 @@ std::optional<PrintCovariance> covariance_of(ceres::Problem& problem, SharedUnkn
     unknowns.push_back(errors[i].unknown);
     prior[static_cast<Eigen::Index>(i)] = errors[i].sigma;
   }
-  ceres::Covariance::Options options;
-  options.algorithm_type = ceres::SPARSE_QR;
-  ceres::Covariance covariance(options);
-  if (!covariance.Compute(unknowns, &problem)) return std::nullopt;
-  const auto size = static_cast<Eigen::Index>(unknowns.size());
-  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> all(size, size);
-  if (!covariance.GetCovarianceMatrix(unknowns, all.data())) return std::nullopt;
-  const PrintCovariance joint = all.topLeftCorner<print_numbers, print_numbers>();
-  const Eigen::MatrixXd cross = all.topRightCorner(print_numbers, prior.size());
-  const Eigen::MatrixXd of_common = all.bottomRightCorner(prior.size(), prior.size());
+  const auto all = covariance_of(problem, unknowns);
+  if (!all) return std::nullopt;
+  const PrintCovariance joint = all->topLeftCorner<print_numbers, print_numbers>();
+  const Eigen::MatrixXd cross = all->topRightCorner(print_numbers, prior.size());
+  const Eigen::MatrixXd of_common = all->bottomRightCorner(prior.size(), prior.size());
   const Eigen::MatrixXd by_common = solve_symmetric(of_common, cross.transpose()).transpose();
   const PrintCovariance known = joint - by_common * cross.transpose();  // were the common errors known
   const PrintCovariance print = std::max(1.0, noise_scale * noise_scale) * known +
@@ -355,6 +342,17 @@ std::optional<PrintCovariance> covariance_of(ceres::Problem& problem, SharedUnkn
   units[print_numbers - 1] = problem.IsParameterBlockConstant(&shared.gap_rad) ? 0 : 1;
   const PrintCovariance scaled = units.asDiagonal() * print * units.asDiagonal();
   return scaled.allFinite() ? std::optional(scaled) : std::nullopt;
+}
+
+// d(a number of the rig)/d(print_numbers).
+PrintNumbers unit(int number) {
+  return number < 0 ? PrintNumbers::Zero() : PrintNumbers(PrintNumbers::Unit(number));
+}
+PrintNumbers upper_row(int boundary) {
+  return unit(boundary - 1);
+}
+PrintNumbers lower_row(int boundary) {
+  return unit(3 + boundary);
 }
 
 }  // namespace
@@ -375,12 +373,8 @@ std::optional<Adjustment> adjust(const std::vector<ViewMeasurements>& frames, co
     if (!options.free_print || (number == &shared.gap_rad && !options.free_gap))
       problem.SetParameterBlockConstant(number);
 
-  ceres::Solver::Options solver;
-  solver.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
-  solver.max_num_iterations = 30;
-  solver.function_tolerance = 1e-9;
-  ceres::Solver::Summary summary;
-  if (!solve_quietly(solver, problem, summary, at_iteration)) return std::nullopt;
+  const SolverChoice solver{ceres::SPARSE_NORMAL_CHOLESKY, 30, 1e-9};
+  if (!solve_quietly(solver, problem, at_iteration).IsSolutionUsable()) return std::nullopt;
 
   Adjustment result;
   const double edges_px = sigma_of_edges_px(frames);
@@ -402,11 +396,72 @@ std::optional<Adjustment> adjust(const std::vector<ViewMeasurements>& frames, co
     const PrintDepartures departures =
         departures_at(problem, frames, edges, options.loss_scale_sigmas, shared, unknowns);
     result.faults = departures.faults;
-    result.covariance = covariance_of(problem, shared, common_errors(shared, frames, edges_px, free_lag),
-                                      result.noise_scale, departures.covariance);
+    result.covariance = print_covariance(problem, shared, common_errors(shared, frames, edges_px, free_lag),
+                                         result.noise_scale, departures.covariance);
     if (!result.covariance) return std::nullopt;
   }
   return result;
+}
+
+PrintShape PrintShape::of(const Marker& marker) {
+  PrintShape shape;
+  shape.upper_m = boundaries_m(marker, 0);
+  const auto slopes_m = boundary_slopes_m(marker);
+  for (std::size_t k = 0; k < 4; ++k) shape.lower_m[k] = shape.upper_m[k] + slopes_m[k] * marker.covered_rad();
+  shape.gap_rad = marker.gap_rad;
+  return shape;
+}
+
+Marker PrintShape::on(Marker marker) const {
+  for (std::size_t i = 0; i < 3; ++i) {
+    marker.bands_upper_m[i] = upper_m[i + 1] - upper_m[i];
+    marker.bands_lower_m[i] = lower_m[i + 1] - lower_m[i];
+  }
+  marker.wrap_m = lower_m[0];
+  marker.skew_m = lower_m[3] - lower_m[0] - upper_m[3];
+  marker.gap_rad = gap_rad;
+  return marker;
+}
+
+PrintShape changed_by(const PrintShape& shape, const PrintNumbers& change) {
+  PrintShape changed = shape;
+  for (int k = 0; k < 4; ++k) {
+    if (k > 0) changed.upper_m[static_cast<std::size_t>(k)] += change[k - 1];
+    changed.lower_m[static_cast<std::size_t>(k)] += change[3 + k];
+  }
+  changed.gap_rad += change[7];
+  return changed;
+}
+
+MarkerSigmas sigmas_of(const PrintCovariance& covariance, MarkerSigmas others) {
+  const auto sigma = [&](const PrintNumbers& row) { return rounded_sigma(std::sqrt(row.dot(covariance * row))); };
+  std::array<double, 3> upper{}, lower{};
+  for (int i = 0; i < 3; ++i) {
+    upper[static_cast<std::size_t>(i)] = sigma(upper_row(i + 1) - upper_row(i));
+    lower[static_cast<std::size_t>(i)] = sigma(lower_row(i + 1) - lower_row(i));
+  }
+  others.bands_upper_m = upper, others.bands_lower_m = lower;
+  others.wrap_m = sigma(lower_row(0));
+  others.skew_m = sigma(lower_row(3) - lower_row(0) - upper_row(3));
+  others.gap_rad = sigma(unit(7));
+  return others;
+}
+
+double tolerance_of(const PrintShape& shape, const PrintCovariance& covariance, const Marker& marker) {
+  constexpr int steps = 36;
+  const Marker printed = shape.on(marker);
+  double variance = 0, of_a_metre = 0;
+  for (int i = 0; i < steps; ++i) {
+    const double fraction = (i + 0.5) / steps, tau_rad = fraction * printed.covered_rad();
+    const auto by_boundaries = tau_by_boundaries(printed, tau_rad);
+    PrintNumbers row = PrintNumbers::Zero();
+    for (int k = 0; k < 4; ++k)
+      row += by_boundaries[static_cast<std::size_t>(k)] * ((1 - fraction) * upper_row(k) + fraction * lower_row(k));
+    variance += row.dot(covariance * row);
+    const double unit_rad = predicted_print_error_rad(printed, tau_rad, 1);
+    of_a_metre += unit_rad * unit_rad;
+  }
+  return rounded_sigma(std::sqrt(variance / of_a_metre));
 }
 
 }  // namespace lapservo::internal

@@ -10,8 +10,7 @@
 #include "lapservo/core/dense_matrix.h"
 #include "lapservo/testing/scenes.h"
 
-namespace lapservo::internal {
-namespace print_adjustment_test {
+namespace lapservo::internal::print_adjustment_test {
 
 // Exact measurements of a rotation.
 std::vector<ViewMeasurements> seen_turn(const Rig& rig) {
@@ -142,5 +141,4 @@ TEST_F(SeamLag, IsDoubtedInACompressedTurnOfOneWay) {
   EXPECT_GT(one_way_rad, 1.2 * both_rad);
 }
 
-}  // namespace print_adjustment_test
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::print_adjustment_test

@@ -1,7 +1,6 @@
-#include "lapservo/calibration/marker/print_shape.h"
-
 #include <gtest/gtest.h>
 
+#include "lapservo/calibration/marker/print_adjustment.h"
 #include "lapservo/testing/markers.h"
 
 namespace lapservo::internal {

@@ -363,10 +363,8 @@ Section processed(const Section& section, const SeamFit& found, double seen_px, 
       for (std::size_t i = 0; i < light.size(); ++i)
         light[i][c] = true_basis.row(static_cast<Eigen::Index>(i)).dot(colours);
     }
-    FilteredLight filtered = filtered_light(light_of_value, processing, light);
-    if (grey)
-      for (std::size_t i = 0; i < light.size(); ++i) filtered.light[i].fill(filtered.luma[i]);
-    profile.light = grey ? sampled(filtered.light) : std::move(filtered.light);
+    profile.light = filtered_light(light_of_value, processing, light, grey);
+    if (grey) profile.light = sampled(profile.light);
     for (std::size_t i = 0; i < light.size(); ++i)
       for (double& channel : profile.light[i]) channel *= profile.count[i];
   }

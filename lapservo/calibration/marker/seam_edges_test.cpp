@@ -44,11 +44,9 @@ struct GapShot {
 
 // Sharpening draws the edges of dark gaps towards one another.
 TEST(SeamEdges, LieWhereTheyDoWithoutSharpening) {
-  effects::CameraEffects effects;
-  effects.sharpening = 0.8, effects.sharpening_px = 1.4;
-  PictureProcessing processing;
-  processing.blur_px = 0.9;
-  processing.sharpening = effects.sharpening, processing.sharpening_px = effects.sharpening_px;
+  constexpr double amount = 0.8, radius_px = 1.4;
+  const effects::CameraEffects effects{.sharpening = amount, .sharpening_px = radius_px};
+  const PictureProcessing processing{.blur_px = 0.9, .sharpening = amount, .sharpening_px = radius_px};
   double moved_rad = 0, left_rad = 0;
   int seen = 0;
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
@@ -67,10 +65,8 @@ TEST(SeamEdges, LieWhereTheyDoWithoutSharpening) {
 
 // A gap of ten pixels is grey, so that blurred colour differences mix over all of it.
 TEST(SeamEdges, LieWhereTheyDoByLumaWhereColoursAreBlurred) {
-  effects::CameraEffects effects;
-  effects.subsampled = true;
-  PictureProcessing processing;
-  processing.blur_px = 0.85, processing.chroma_variance_px2 = 1.2;
+  const effects::CameraEffects effects{.subsampled = true};
+  const PictureProcessing processing{.blur_px = 0.85, .chroma_variance_px2 = 1.2};
   constexpr double seen_px = 1.15;
   double by_colours = 0, by_luma = 0;
   int seen = 0;
@@ -109,8 +105,7 @@ TEST(SeamEdges, LieWhereTheyAreBesideHighlights) {
 
 // The effect of compression on a seam is alike along the shaft.
 TEST(SeamEdges, KnowHowFarCompressionMovesThem) {
-  effects::CameraEffects jpeg;
-  jpeg.jpeg_quality = 50;
+  const effects::CameraEffects jpeg{.jpeg_quality = 50};
   double squares = 0, sigmas_px = 0;
   int seen = 0;
   for (std::uint64_t seed = 1; seed <= 24; ++seed) {

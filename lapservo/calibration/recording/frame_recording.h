@@ -30,6 +30,12 @@ struct JobWatch {
   }
 };
 
+/// A number of the rig that was measured, in the unit that its name ends in; sigma: one standard deviation.
+struct CalibratedNumber {
+  std::string name;
+  double before, after, sigma;
+};
+
 /// How many of so many frames are damaged, and the remedy.
 std::string text_of_damaged(int damaged, int frames);
 

@@ -30,6 +30,13 @@ struct JointRecording {
   std::string remark() const;
 };
 
+/// The joints' readings during frames.
+struct JointInput {
+  Joints joints;
+  JointRecording recording;
+  std::string source;  ///< for complaints
+};
+
 /// A CSV of `time_s` and a column a joint (docs/calibration.md). Throws InputError for columns that are missing,
 /// numbers that are none, fewer than two rows and times that do not rise. A row that repeats the one before is passed
 /// over.

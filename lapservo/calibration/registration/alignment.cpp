@@ -1,8 +1,6 @@
 #include "lapservo/calibration/registration/alignment.h"
 
 #include <algorithm>
-#include <cmath>
-#include <optional>
 
 #include <fmt/format.h>
 
@@ -38,9 +36,7 @@ double explained(const std::vector<Alignment::Pair>& pairs) {
       misses.push_back(std::abs(pair.seen[j] - pair.read[j]));
     }
     const double n = static_cast<double>(pairs.size()), variance = squares / n - sum * sum / (n * n);
-    std::sort(misses.begin(), misses.end());
-    misses.resize(misses.size() - misses.size() / 10);
-    least = std::min(least, 1 - std::pow(rms(misses), 2) / std::max(1e-300, variance));
+    least = std::min(least, 1 - std::pow(rms_but_tenth(misses), 2) / std::max(1e-300, variance));
   }
   return least;
 }

@@ -18,10 +18,7 @@ Alignment aligned(const Recorded& data) {
 
 // Two recordings of 50 s, of which the later one begins up to 30 s after the other, by clocks that begin with them.
 Motion apart(std::uint64_t seed, double seconds_apart) {
-  Motion motion;
-  motion.seed = seed, motion.seconds = 50, motion.joints_from_s = seconds_apart;
-  motion.wave = irregular(seed);
-  return motion;
+  return {.seconds = 50, .joints_from_s = seconds_apart, .seed = seed, .wave = irregular(seed)};
 }
 
 TEST(Align, ErrorsAreAsTheirSigmasSayOverAllOffsets) {

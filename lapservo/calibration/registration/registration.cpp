@@ -38,15 +38,14 @@ Eigen::Vector4d quaternion_sigma(const Eigen::Quaterniond& q, const Eigen::Matri
 // Where the axes meet when all of them are wrong alike: in distance, and tilted along the view.
 Eigen::Matrix3d common_covariance(const std::vector<TimedPose>& poses, const Eigen::Vector3d& rcm_m) {
   constexpr double common_fraction = 0.5;
-  std::vector<double> scales, tilts_m;
   Eigen::Vector3d ray = Eigen::Vector3d::Zero();
-  for (const TimedPose& pose : poses) {
-    scales.push_back(pose.marker.sigma_z_m / pose.origin().norm());
-    tilts_m.push_back(pose.marker.sigma_axis_rad * (pose.origin() - rcm_m).norm());
-    ray += pose.origin();
-  }
-  const Eigen::Vector3d stretched = common_fraction * median(scales) * rcm_m;
-  const Eigen::Vector3d tilted = common_fraction * median(tilts_m) * ray.normalized();
+  for (const TimedPose& pose : poses) ray += pose.origin();
+  const double scale =
+      median(values_of(poses, [](const TimedPose& pose) { return pose.marker.sigma_z_m / pose.origin().norm(); }));
+  const double tilt_m = median(values_of(
+      poses, [&](const TimedPose& pose) { return pose.marker.sigma_axis_rad * (pose.origin() - rcm_m).norm(); }));
+  const Eigen::Vector3d stretched = common_fraction * scale * rcm_m;
+  const Eigen::Vector3d tilted = common_fraction * tilt_m * ray.normalized();
   return stretched * stretched.transpose() + tilted * tilted.transpose();
 }
 
@@ -64,9 +63,7 @@ Eigen::Quaterniond usual_rotation(const std::vector<TimedPose>& poses) {
 // Half of a frame's error of the roll is the film's, the print's and the image's processing: common to all frames, and
 // indistinguishable from psi's offset.
 double common_turn_rad(const std::vector<TimedPose>& poses) {
-  std::vector<double> sigmas_rad;
-  for (const TimedPose& pose : poses) sigmas_rad.push_back(pose.marker.sigma_roll_rad);
-  return 0.5 * median(sigmas_rad);
+  return 0.5 * median(values_of(poses, [](const TimedPose& pose) { return pose.marker.sigma_roll_rad; }));
 }
 
 void report_arm(const ArmFit& fitted, Registration& result) {
@@ -111,11 +108,7 @@ Largest largest_sigma(const Registration& registration) {
 // Rms, without the tenth that is worst: an angle that wraps, a wrong pose.
 Largest largest_residual(const Registration& registration) {
   const auto most = [&](double RegistrationResidual::*size) {
-    std::vector<double> sizes;
-    for (const RegistrationResidual& residual : registration.residuals) sizes.push_back(residual.*size);
-    std::sort(sizes.begin(), sizes.end());
-    sizes.resize(sizes.size() - sizes.size() / 10);
-    return rms(sizes);
+    return rms_but_tenth(values_of(registration.residuals, size));
   };
   return {most(&RegistrationResidual::position_m),
           std::max(most(&RegistrationResidual::axis_rad), most(&RegistrationResidual::roll_rad))};
@@ -186,9 +179,8 @@ Registration register_rcm(const Instrument& instrument, const std::vector<TimedP
                          : std::string("the shaft's axes are too alike to locate their intersection: ") + swing_more;
     return result;
   }
-  std::vector<double> beyond_m;
-  for (const TimedPose& pose : poses) beyond_m.push_back(pose.beyond_m(meeting->point_m));
-  if (median(beyond_m) < 0) return result.refusal = reversed_marker, result;
+  if (median(values_of(poses, [&](const TimedPose& pose) { return pose.beyond_m(meeting->point_m); })) < 0)
+    return result.refusal = reversed_marker, result;
   const bool known = instrument.camera_from_rcm.has_value();
   result.camera_from_rcm = {known ? instrument.camera_from_rcm->rotation : usual_rotation(poses), meeting->point_m};
   result.sigma_translation_m = sigma_m;

@@ -2,11 +2,9 @@
 
 #include <cstddef>
 #include <filesystem>
-#include <optional>
 #include <string>
 #include <vector>
 
-#include "lapservo/calibration/calibrated_number.h"
 #include "lapservo/calibration/recording/frame_recording.h"
 #include "lapservo/calibration/registration/registration.h"
 #include "lapservo/calibration/registration/timed_pose.h"

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 #include <string>
+#include <tuple>
 #include <utility>
 
 #include <Eigen/Geometry>
@@ -44,6 +45,8 @@ Registration registered_from_names(const Recorded& data) {
   return registered_by(data, with_names_only(data.truth));
 }
 
+constexpr std::array slack{0.01, 0.01, 1e-3, 0.03};  // of the joints
+
 struct Errors {
   double position_m, rotation_rad, phi_rad, rho_m, psi_rad, delay_s;
 };
@@ -62,9 +65,7 @@ Errors errors_of(const Registration& found, const Instrument& truth) {
 TEST(RegisterArm, FindsAllOfItFromNamesAlone) {
   for (const double delay_s : {-2.7, 0.08, 0.25, 3.0})
     for (const double phi_sign : {1.0, -1.0}) {
-      Motion motion;
-      motion.delay_s = delay_s, motion.sign[1] = phi_sign, motion.sign[2] = -phi_sign;
-      const Recorded data = recorded(motion);
+      const Recorded data = recorded({.delay_s = delay_s, .sign = {1, phi_sign, -phi_sign, -1}});
       const auto found = registered_from_names(data);
       ASSERT_EQ(found.refusal, "");
       EXPECT_EQ(found.arm->joints.sign, data.truth.joints->sign);
@@ -80,9 +81,7 @@ TEST(RegisterArm, FindsAllOfItFromNamesAlone) {
 }
 
 TEST(RegisterArm, OfTwoDescriptionsTakesTheRigs) {
-  Motion motion;
-  motion.sign = {-1, 1, 1, 1};
-  const Recorded data = recorded(motion);
+  const Recorded data = recorded({.sign = {-1, 1, 1, 1}});
   Instrument known = data.truth;
   known.camera_from_rcm->rotation =
       known.camera_from_rcm->rotation * Eigen::AngleAxisd(0.15, Eigen::Vector3d(1, 2, 3).normalized());
@@ -97,9 +96,7 @@ TEST(RegisterArm, OfTwoDescriptionsTakesTheRigs) {
 TEST(RegisterArm, ErrorsAreAsTheirSigmasSayBacklashOrNot) {
   double squares = 0, count = 0;
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
-    Motion motion;
-    motion.seed = seed, motion.seconds = 10;
-    if (seed % 2) motion.backlash = {0.01, 0.01, 1e-3, 0.03};
+    const Motion motion{.seconds = 10, .backlash = seed % 2 ? slack : Motion{}.backlash, .seed = seed};
     const Recorded data = recorded(motion);
     const auto found = registered_from_names(data);
     ASSERT_EQ(found.refusal, "");
@@ -124,11 +121,10 @@ TEST(RegisterArm, PlacesMarkersAsTheirSigmasSayBesideTheSwing) {
   constexpr int seeds = 36;
   std::array<Eigen::Array3d, 2> squares{Eigen::Array3d::Zero(), Eigen::Array3d::Zero()};
   for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
-    Motion motion;
-    motion.seed = seed, motion.seconds = 10;
-    if (seed % 2) motion.backlash = {0.01, 0.01, 1e-3, 0.03};
-    motion.common_turn_rad = 0.5e-3 * Random(100 + seed).normal();  // half of a frame's sigma
-    const Recorded data = recorded(motion);
+    const Recorded data = recorded({.seconds = 10,
+                                    .common_turn_rad = 0.5e-3 * Random(100 + seed).normal(),  // half of a frame's sigma
+                                    .backlash = seed % 2 ? slack : Motion{}.backlash,
+                                    .seed = seed});
     const auto found = registered_from_names(data);
     ASSERT_EQ(found.refusal, "");
     Instrument registered = data.truth;
@@ -208,31 +204,19 @@ TEST(RegisterArm, RefusesASignThatDoesNotShow) {
   }
 }
 
-// Too far for the signs to show.
+// Too far for the signs to show; insertion's does not pass for a backlash of less than nothing, which has the
+// instrument move by twice the readings, where these begin in their middle.
 TEST(RegisterArm, NamesTheJointWhoseScaleIsFarOff) {
-  for (const auto& [joint, by] : {std::pair{0, 0.5}, {3, 1 / two_pi}}) {
-    Motion motion;
-    motion.swing[3] = 2.5, motion.seconds = 10;
-    Recorded data = recorded(motion);
-    const auto j = static_cast<std::size_t>(joint);
-    for (auto& at : data.recording.joints) at[j] *= by;
-    EXPECT_TRUE(has(registered_from_names(data).refusal, data.truth.joints->names[j] + " moves by")) << by;
+  for (const auto& [joint, by, roll_swing, seed] :
+       {std::tuple{0U, 0.5, 2.5, 1U}, {3U, 1 / two_pi, 2.5, 1U}, {2U, 0.5, 1.0, 7U}}) {
+    Recorded data = recorded({.seconds = 10, .swing = {1, 1, 1, roll_swing}, .seed = seed});
+    for (auto& at : data.recording.joints) at[joint] *= by;
+    EXPECT_TRUE(has(registered_from_names(data).refusal, data.truth.joints->names[joint] + " moves by")) << by;
   }
 }
 
-// A backlash of less than nothing has the instrument move by twice the readings, where these begin in their middle.
-TEST(RegisterArm, TakesNoScaleForABacklash) {
-  Motion motion;
-  motion.seed = 7, motion.seconds = 10;
-  Recorded data = recorded(motion);
-  for (auto& at : data.recording.joints) at[2] *= 0.5;
-  EXPECT_TRUE(has(registered_from_names(data).refusal, "insertion moves by"));
-}
-
 TEST(RegisterArm, RefusesWhatCanNotTell) {
-  Motion still;
-  still.swing.fill(0.01);
-  EXPECT_TRUE(has(registered_from_names(recorded(still)).refusal, "swing"));
+  EXPECT_TRUE(has(registered_from_names(recorded({.swing = {0.01, 0.01, 0.01, 0.01}})).refusal, "swing"));
   const Recorded data = recorded({});
   Recorded swapped = data, elsewhere = data, few = data;
   for (auto& joints : swapped.recording.joints) std::swap(joints[0], joints[2]);
@@ -247,9 +231,7 @@ TEST(RegisterArm, RefusesWhatCanNotTell) {
 
 // As far from the configuration as readings are taken.
 TEST(RegisterArm, FindsNoOffsetThatARigMayNotHave) {
-  Motion motion;
-  motion.offset = {0.2, 7.2, 1.05, 0.7};
-  const Recorded data = recorded(motion);
+  const Recorded data = recorded({.offset = {0.2, 7.2, 1.05, 0.7}});
   Rig rig = testing::paper_test_rig();
   rig.instruments[0] = registered(data.truth, registered_from_names(data));
   EXPECT_NO_THROW(check_units(data.recording, *data.truth.joints, "joints.csv", JointsOf::arm));
@@ -298,9 +280,7 @@ TEST(PosesInTable, LeavesOutWhatACameraFromRcmBent) {
 TEST(RegisterRcm, PutsItWhereTheAxesMeet) {
   double squares = 0, count = 0;
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
-    Motion motion;
-    motion.seed = seed;
-    const Recorded data = recorded(motion);
+    const Recorded data = recorded({.seed = seed});
     Instrument unknown = data.truth;
     unknown.camera_from_rcm.reset();
     const auto found = register_rcm(unknown, data.poses);
@@ -315,9 +295,8 @@ TEST(RegisterRcm, PutsItWhereTheAxesMeet) {
   }
   EXPECT_GT(std::sqrt(squares / count), 0.05) << "sigma counts what frames have in common; these have nothing";
   EXPECT_LT(std::sqrt(squares / count), 1);
-  Motion still;
-  still.swing.fill(0.05);
-  EXPECT_TRUE(has(register_rcm(recorded(still).truth, recorded(still).poses).refusal, "too alike"));
+  const Recorded still = recorded({.swing = {0.05, 0.05, 0.05, 0.05}});
+  EXPECT_TRUE(has(register_rcm(still.truth, still.poses).refusal, "too alike"));
 }
 
 // A fault of poses by themselves, with a size that is gross.
@@ -350,9 +329,7 @@ TEST(RegisterRcm, RefusesOrNamesWhatNoPointExplainsAndItsSigmaHolds) {
     int refused = 0, said = 0, named = 0, wrong = 0;
     double squares = 0;
     for (int seed = 1; seed <= seeds; ++seed) {
-      Motion motion;
-      motion.seed = 100 + static_cast<std::uint64_t>(seed);
-      Recorded data = recorded(motion);
+      Recorded data = recorded({.seed = 100 + static_cast<std::uint64_t>(seed)});
       const double span_s = data.poses.back().time_s - data.poses.front().time_s;
       for (TimedPose& pose : data.poses)
         if (fault) fault->apply(pose, (pose.time_s - data.poses.front().time_s) / span_s, size);

@@ -2,20 +2,37 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <numbers>
 #include <utility>
 
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 
 #include "lapservo/calibration/marker/frame_fit.h"
-#include "lapservo/calibration/tip/tool_place.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/core/dense_matrix.h"
 #include "lapservo/core/statistics.h"
 #include "lapservo/geometry/rotation.h"
+#include "lapservo/tool/wrist.h"
 
 namespace lapservo::internal {
 namespace {
+
+// Something that a fit leaves out: it moves the points, camera frame.
+struct TipFault {
+  std::string what, remedy;
+  std::vector<Eigen::Matrix3Xd> moves;  // a matrix a component, of a size of 1 m at the tip; a column a sighting
+};
+
+// One way to measure a tip, beside its sightings.
+struct TipWay {
+  std::vector<TipFault> faults;
+  double sigma_point_m = 0;         // of each point by itself
+  double unmodelled_sigmas = 1;     // times what scatters, see frame_fit.h
+  std::size_t alike_sightings = 1;  // over so many errors are alike
+  std::string to_mend, to_do;       // against a misfit that nothing explains, and for a tip that is left open
+};
 
 // A tip that is known worse is not written, nor one by data that depart from their model by more.
 constexpr double max_sigma_m = 0.5e-3, max_misfit_m = 0.3e-3, max_azimuth_sigma_rad = 0.1;
@@ -28,16 +45,12 @@ constexpr double step_m = 1e-5, step_rad = 1e-4;
 // Errors that all poses share: the scale of distances, the axis' tilt along the view, the turn about it.
 std::vector<Unknown> common_errors(const std::vector<TipSighting>& sightings) {
   constexpr double common_fraction = 0.5;
-  std::vector<double> scales, tilts_rad, rolls_rad;
-  for (const TipSighting& sighting : sightings) {
-    const auto& seen = sighting.pose.marker;
-    scales.push_back(seen.sigma_z_m / sighting.pose.origin().norm());
-    tilts_rad.push_back(seen.sigma_axis_rad / std::sqrt(2.0)), rolls_rad.push_back(seen.sigma_roll_rad);
-  }
-  std::vector<Unknown> unknowns;
-  for (auto* sigmas : {&scales, &tilts_rad, &rolls_rad})
-    unknowns.push_back({0, step_rad, common_fraction * median(*sigmas)});
-  return unknowns;
+  const auto unknown = [&](auto sigma_of) -> Unknown {
+    return {0, step_rad, common_fraction * median(values_of(sightings, sigma_of))};
+  };
+  return {unknown([](const TipSighting& s) { return s.pose.marker.sigma_z_m / s.pose.origin().norm(); }),
+          unknown([](const TipSighting& s) { return s.pose.marker.sigma_axis_rad / std::sqrt(2.0); }),
+          unknown([](const TipSighting& s) { return s.pose.marker.sigma_roll_rad; })};
 }
 
 // Across the axis and the view: about it an axis tilts along the view.
@@ -230,8 +243,9 @@ std::string refusal_of(const TipCalibration& result, const TipWay& way, double f
   return {};
 }
 
-}  // namespace
-
+// The place of a tool whose tip was at points (Ceres, Cauchy loss). Half of a pose's error is common to all. A wrist
+// that is bent differently in the sightings shows its azimuth and its joints' offsets, which the tool's own sigmas
+// bound. Refused where the tip is left open, or misses its points by more than a tip may be off.
 TipCalibration fit_tip(const Tool& tool, const std::vector<TipSighting>& sightings, const TipWay& way) {
   TipCalibration result;
   const auto best = best_fit(tool, sightings, way, false);
@@ -253,6 +267,184 @@ TipCalibration fit_tip(const Tool& tool, const std::vector<TipSighting>& sightin
   if (fault.size_m > least_fault_m) result.fault = fault.text;
   result.refusal = refusal_of(result, way, fault.size_m);
   return result;
+}
+
+constexpr std::size_t least_poses = 40, enough_poses = 150;  // more are alike
+constexpr double least_spread_rad = 0.05;  // rms, of the orientations about the axis about which they differ least
+constexpr double play_rad = 0.03;          // what is looser turns back later
+constexpr double usual_unmodelled_sigmas = 1.4;  // errors that go with the pose are in no covariance
+constexpr int times = 12;                        // slips are looked for at the ends of so many parts of the recording
+
+constexpr auto to_do = "tilt the shaft by 20 degrees or more to all sides and roll it, for 20 s, the tip in its dimple";
+constexpr auto hold_wrist = "hold the wrist straight with its motors on, press less, and record again; or use --touch";
+
+double spread_rad(const std::vector<TimedPose>& poses) {
+  Eigen::Matrix3d mean = Eigen::Matrix3d::Zero();
+  for (const TimedPose& pose : poses)
+    mean += pose.marker.camera_from_marker.rotation.toRotationMatrix() / static_cast<double>(poses.size());
+  const Eigen::Matrix3d spread = Eigen::Matrix3d::Identity() - mean.transpose() * mean;
+  return std::sqrt(std::max(0.0, eigenvalues_of_symmetric(spread)[0]));
+}
+
+Eigen::Matrix3Xd moves_of(const std::vector<TimedPose>& poses,
+                          const std::function<Eigen::Vector3d(const TimedPose&, double)>& move) {
+  const double first_s = poses.front().time_s, span_s = std::max(1e-9, poses.back().time_s - first_s);
+  Eigen::Matrix3Xd moves(3, static_cast<Eigen::Index>(poses.size()));
+  for (std::size_t i = 0; i < poses.size(); ++i)
+    moves.col(static_cast<Eigen::Index>(i)) = move(poses[i], (poses[i].time_s - first_s) / span_s);
+  return moves;
+}
+
+// A tip that sticks in its dimple is left to the side by the shaft: the mean axis, in the marker's axes, drags a circle
+// of the play along.
+TipFault loose_wrist(const std::vector<TimedPose>& poses) {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const TimedPose& pose : poses) mean += pose.axis();
+  Eigen::Vector2d circle = Eigen::Vector2d::Zero();
+  return {"the tip stays behind the shaft to either side, as of a loose wrist,",
+          hold_wrist,
+          {moves_of(poses, [&](const TimedPose& pose, double) {
+            const Eigen::Quaterniond& turn = pose.marker.camera_from_marker.rotation;
+            const Eigen::Vector2d at = (turn.conjugate() * mean.normalized()).head<2>();
+            const double beyond = (at - circle).norm();
+            if (beyond > play_rad) circle = at + play_rad / beyond * (circle - at);
+            const Eigen::Vector2d side = (at - circle) / play_rad;
+            return Eigen::Vector3d(turn * Eigen::Vector3d(side.x(), side.y(), 0));
+          })}};
+}
+
+std::vector<TipFault> possible_faults(const std::vector<TimedPose>& poses) {
+  TipFault drift{"the dimple moves over the recording", "fasten its block and the endoscope, and record again", {}};
+  std::vector<TipFault> faults{loose_wrist(poses)};
+  for (int k = 0; k < times; ++k) {
+    const double at = static_cast<double>(k) / times;
+    const auto side = [=](double part) { return part > at ? 0.5 : -0.5; };
+    const double at_s = poses.front().time_s + at * (poses.back().time_s - poses.front().time_s);
+    TipFault slip{fmt::format("the tip slipped at about {:.0f} s", at_s),
+                  "use a deeper dimple, press the tip into it, and record again",
+                  {}};
+    TipFault bend{fmt::format("the wrist moved at about {:.0f} s, and the tip", at_s), hold_wrist, {}};
+    for (Eigen::Index i = 0; i < 3; ++i) {
+      const Eigen::Vector3d axis = Eigen::Vector3d::Unit(i);
+      if (k == 0) {
+        drift.moves.push_back(moves_of(poses, [&](const TimedPose&, double part) { return (part - 0.5) * axis; }));
+        continue;
+      }
+      slip.moves.push_back(moves_of(poses, [&](const TimedPose&, double part) { return side(part) * axis; }));
+      if (i == 2) continue;
+      bend.moves.push_back(moves_of(poses, [&](const TimedPose& pose, double part) {
+        return Eigen::Vector3d(pose.marker.camera_from_marker.rotation * (side(part) * axis));
+      }));
+    }
+    if (k > 0) faults.push_back(slip), faults.push_back(bend);
+  }
+  faults.push_back(drift);
+  return faults;
+}
+
+constexpr double touch_sigma_m = 0.1e-3;
+constexpr std::size_t least_touches = 5;
+
+std::vector<TipFault> possible_faults(const std::vector<TipSighting>& touches) {
+  const auto count = static_cast<Eigen::Index>(touches.size());
+  TipFault drift{"the board moves over the touches", "fasten it and the endoscope, and begin anew", {}};
+  for (Eigen::Index i = 0; i < 3; ++i)
+    drift.moves.emplace_back(Eigen::Vector3d::Unit(i) * Eigen::RowVectorXd::LinSpaced(count, -0.5, 0.5));
+  Eigen::Matrix3Xd points(3, count);
+  for (Eigen::Index i = 0; i < count; ++i) points.col(i) = *touches[static_cast<std::size_t>(i)].point_in_camera_m;
+  points /= points.rowwise().mean().norm();
+  return {drift,
+          {"the board is nearer or farther than the marker has it",
+           "measure its squares and the marker's diameter with callipers",
+           {points}}};
+}
+
+// Azimuth and offsets stay; without a place any azimuth is possible, and offsets are as large as the readings' sigmas.
+Tool::Place place_before(const Tool& tool) {
+  if (tool.place) return *tool.place;
+  Tool::Place place;
+  if (tool.wrist.empty()) return place;
+  const double any_azimuth_rad = std::numbers::pi / std::sqrt(3.0);
+  place.covariance(3, 3) = any_azimuth_rad * any_azimuth_rad;
+  for (std::size_t i = 0; i < tool.wrist.size(); ++i) {
+    const auto k = static_cast<Eigen::Index>(4 + i);
+    place.covariance(k, k) = std::pow(tool.wrist[i].sigma_reading_rad, 2);
+  }
+  return place;
+}
+
+}  // namespace
+
+TipCalibration pivoted_tip(const Tool& tool, const std::vector<double>& wrist_rad,
+                           const std::vector<TimedPose>& all_poses) {
+  TipCalibration result;
+  const std::vector<TimedPose> poses = some_of(all_poses, enough_poses);
+  if (poses.size() < least_poses) {
+    result.refusal = fmt::format("the marker is seen in {} frames, {} are needed: record 20 s, the marker in view",
+                                 poses.size(), least_poses);
+  } else if (!(spread_rad(poses) > least_spread_rad)) {
+    result.refusal = fmt::format(
+        "the shaft turned about one axis only, as between two orientations, which leaves the tip open along it: {}",
+        to_do);
+  } else {
+    std::vector<TipSighting> sightings;
+    for (const TimedPose& pose : poses) sightings.push_back({pose, wrist_rad});
+    result = fit_tip(tool, sightings,
+                     {possible_faults(poses), 0, usual_unmodelled_sigmas, poses_per_second(poses),
+                      "is it in its dimple all the time, is the wrist held straight, does anything else move", to_do});
+  }
+  return result;
+}
+
+TipCalibration touched_tip(const Tool& tool, const std::vector<TipSighting>& touches,
+                           const std::vector<std::string>& names) {
+  constexpr double outlying = 8, least_outlying_m = 0.5e-3;
+  TipCalibration result;
+  if (touches.size() < least_touches)
+    return result.refusal = fmt::format("{} touches show the marker, {} are needed", touches.size(), least_touches),
+           result;
+  result = fit_tip(tool, touches,
+                   {possible_faults(touches), touch_sigma_m, 1, 1,
+                    "is the wrist loose (hold it with its motors on), are the corners the ones that are named",
+                    "touch more corners, the shaft tilted and rolled differently"});
+  if (result.misses_m.empty()) return result;
+  const auto worst = std::max_element(result.misses_m.begin(), result.misses_m.end());
+  const double usual_m = median(std::vector<double>(result.misses_m));
+  if (*worst > std::max(least_outlying_m, outlying * usual_m))
+    result.refusal = fmt::format(
+        "{}: the tip is {:.2g} mm from its corner, in most touches {:.2g} mm: is the corner the one that is named, is "
+        "the tip on it",
+        names[static_cast<std::size_t>(worst - result.misses_m.begin())], 1e3 * *worst, 1e3 * usual_m);
+  return result;
+}
+
+Tool placed_by_tip(Tool tool, const std::vector<double>& wrist_rad, const Eigen::Vector3d& tip_in_marker_m,
+                   const Eigen::Matrix3d& covariance_m2) {
+  Tool::Place place = place_before(tool);
+  place.base_in_marker_m.setZero();
+  tool.place = place;
+  place.base_in_marker_m = tip_in_marker_m - tip_in_marker(tool, wrist_rad).marker_from_tip.translation;
+  const auto slopes = tip_slopes(tool, wrist_rad).topRightCorner<3, 5>().eval();
+  const Eigen::Matrix<double, 5, 5> rest = place.covariance.bottomRightCorner<5, 5>();
+  place.covariance.topLeftCorner<3, 3>() = covariance_m2 + slopes * rest * slopes.transpose();
+  place.covariance.topRightCorner<3, 5>() = -slopes * rest;
+  place.covariance.bottomLeftCorner<5, 3>() = place.covariance.topRightCorner<3, 5>().transpose();
+  tool.place = place;
+  return tool;
+}
+
+Tool placed_by_calliper(Tool tool, const Marker& marker, double distance_m, double sigma_m) {
+  Tool::Place place = place_before(tool);
+  double length_m2 = 0;  // the variance of the marker's: between its ends, or of its bands
+  if (marker.sigmas.bands_upper_m)
+    for (const double sigma : *marker.sigmas.bands_upper_m) length_m2 += sigma * sigma;
+  length_m2 = std::max(length_m2, 2 * marker.tolerance_m * marker.tolerance_m);
+  const double across_m2 = off_axis_sigma_m * off_axis_sigma_m;
+  place.base_in_marker_m = {0, 0, marker.length_m() + distance_m};
+  place.covariance.topRows<3>().setZero(), place.covariance.leftCols<3>().setZero();
+  place.covariance.diagonal().head<3>() << across_m2, across_m2, sigma_m * sigma_m + length_m2;
+  tool.place = place;
+  return tool;
 }
 
 }  // namespace lapservo::internal

@@ -7,6 +7,7 @@
 #include <Eigen/Core>
 
 #include "lapservo/calibration/registration/timed_pose.h"
+#include "lapservo/marker/marker.h"
 #include "lapservo/tool/tool.h"
 
 namespace lapservo::internal {
@@ -17,21 +18,6 @@ struct TipSighting {
   std::vector<double> wrist_rad{};  ///< readings of the tool's wrist
   /// Nullopt: a dimple, the same in all sightings.
   std::optional<Eigen::Vector3d> point_in_camera_m{};
-};
-
-/// Something that a fit leaves out: it moves the points, camera frame.
-struct TipFault {
-  std::string what, remedy;
-  std::vector<Eigen::Matrix3Xd> moves;  ///< a matrix a component, of a size of 1 m at the tip; a column a sighting
-};
-
-/// One way to measure a tip, beside its sightings.
-struct TipWay {
-  std::vector<TipFault> faults;
-  double sigma_point_m = 0;         ///< of each point by itself
-  double unmodelled_sigmas = 1;     ///< see frame_fit.h
-  std::size_t alike_sightings = 1;  ///< over so many errors are alike
-  std::string to_mend, to_do;       ///< against a misfit that nothing explains, and for a tip that is left open
 };
 
 struct TipCalibration {
@@ -45,9 +31,23 @@ struct TipCalibration {
   std::string fault;             ///< that shows beyond the noise: the covariance counts it. Empty without one
 };
 
-/// The place of a tool whose tip was at points (Ceres, Cauchy loss). Half of a pose's error is common to all. A wrist
-/// that is bent differently in the sightings shows its azimuth and its joints' offsets, which the tool's own sigmas
-/// bound. Refused where the tip is left open, or misses its points by more than a tip may be off.
-TipCalibration fit_tip(const Tool& tool, const std::vector<TipSighting>& sightings, const TipWay& way);
+/// From poses of a marker whose tip rests in a dimple while the shaft turns about it, with constant readings of the
+/// wrist. Errors of the poses are alike over a second.
+TipCalibration pivoted_tip(const Tool& tool, const std::vector<double>& wrist_rad, const std::vector<TimedPose>& poses);
+
+/// From touches of points that lie still, in the order of `names`: five or more. A tip stands on its point to 0.1 mm.
+TipCalibration touched_tip(const Tool& tool, const std::vector<TipSighting>& touches,
+                           const std::vector<std::string>& names);
+
+/// The tool so placed that at these readings of its wrist its tip lies there. The base's azimuth and the joints'
+/// offsets stay as they are known, or unknown: of a tip that is measured at other readings the covariance counts them.
+Tool placed_by_tip(Tool tool, const std::vector<double>& wrist_rad, const Eigen::Vector3d& tip_in_marker_m,
+                   const Eigen::Matrix3d& covariance_m2);
+
+/// The tool with its base, the tip of a straight one, on the shaft's axis, so far from the marker's distal edge.
+Tool placed_by_calliper(Tool tool, const Marker& marker, double distance_m, double sigma_m);
+
+/// Standard deviation of a base's place across the shaft's axis, where nothing else is known: film, glue, play.
+inline constexpr double off_axis_sigma_m = 0.1e-3;
 
 }  // namespace lapservo::internal

@@ -9,8 +9,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include "lapservo/calibration/tip/tip_ways.h"
-#include "lapservo/calibration/tip/tool_place.h"
+#include "lapservo/calibration/tip/tip_fit.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/core/dense_matrix.h"
 #include "lapservo/core/random.h"
@@ -250,19 +249,13 @@ TEST(TouchedTip, ShowsTheWristsOffsetsWhereItIsBent) {
   EXPECT_LT(rms(offset_sigmas), 1.4);
 }
 
-TEST(TouchedTip, NamesTheTouchOfAnotherCorner) {
+TEST(TouchedTip, IsRefusedWhereATouchIsOfAnotherCornerOrTheBoardMoves) {
   for (std::uint64_t seed = first_seed; seed <= last_seed; ++seed) {
-    Touched recording = touched(seed, Tool{}, 6, 0);
-    recording.touches[3].point_in_camera_m->x() += 5e-3;
-    EXPECT_TRUE(has(touched_tip_of(recording).refusal, "touch 3: the tip is")) << seed;
-  }
-}
-
-TEST(TouchedTip, IsRefusedWhereTheBoardMoves) {
-  for (std::uint64_t seed = first_seed; seed <= last_seed; ++seed) {
-    Touched recording = touched(seed, Tool{}, 10, 0);
-    for (std::size_t i = 0; i < 10; ++i) recording.touches[i].point_in_camera_m->y() += 2e-4 * static_cast<double>(i);
-    EXPECT_TRUE(has(touched_tip_of(recording).refusal, "the board moves")) << seed;
+    Touched elsewhere = touched(seed, Tool{}, 6, 0), moved = touched(seed, Tool{}, 10, 0);
+    elsewhere.touches[3].point_in_camera_m->x() += 5e-3;
+    EXPECT_TRUE(has(touched_tip_of(elsewhere).refusal, "touch 3: the tip is")) << seed;
+    for (std::size_t i = 0; i < 10; ++i) moved.touches[i].point_in_camera_m->y() += 2e-4 * static_cast<double>(i);
+    EXPECT_TRUE(has(touched_tip_of(moved).refusal, "the board moves")) << seed;
   }
 }
 

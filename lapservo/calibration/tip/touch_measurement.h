@@ -10,7 +10,7 @@
 
 #include "lapservo/calibration/camera/board.h"
 #include "lapservo/calibration/recording/frame_recording.h"
-#include "lapservo/calibration/tip/tip_ways.h"
+#include "lapservo/calibration/tip/tip_fit.h"
 #include "lapservo/io/frame_source.h"
 #include "lapservo/rig/rig.h"
 

@@ -1,5 +1,3 @@
-#include "lapservo/io/pictures/jpeg_strays.h"
-
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -15,6 +13,7 @@
 #include "lapservo/core/random.h"
 #include "lapservo/io/frame_source.h"
 #include "lapservo/io/image_file.h"
+#include "lapservo/io/pictures/jpeg_picture.h"
 #include "lapservo/testing/temporary_folder.h"
 
 namespace lapservo::internal {

@@ -1,37 +1,32 @@
 #include "lapservo/io/pictures/libav_picture.h"
 
-#include <algorithm>
-#include <array>
 #include <cstring>
-#include <string_view>
+#include <utility>
 
 extern "C" {
 #include <libavutil/pixdesc.h>
 }
 
+#include "lapservo/io/pictures/picture_parts.h"
 #include "lapservo/io/video/bgr_converter.h"
 #include "lapservo/io/video/libav.h"
 
 namespace lapservo::internal {
 namespace {
-using namespace std::string_view_literals;
 
 constexpr std::int64_t max_pixels = std::int64_t{16384} * 16384;
 
-struct Format {
-  std::string_view magic, name;
-  AVCodecID codec;
-};
-constexpr std::array formats{Format{"BM"sv, "BMP", AV_CODEC_ID_BMP}, Format{"P1"sv, "PNM", AV_CODEC_ID_PPM},
-                             Format{"P2"sv, "PNM", AV_CODEC_ID_PPM}, Format{"P3"sv, "PNM", AV_CODEC_ID_PPM},
-                             Format{"P4"sv, "PNM", AV_CODEC_ID_PPM}, Format{"P5"sv, "PNM", AV_CODEC_ID_PPM},
-                             Format{"P6"sv, "PNM", AV_CODEC_ID_PPM}, Format{"RIFF"sv, "WebP", AV_CODEC_ID_WEBP}};
-
-const Format* format_of(std::span<const std::uint8_t> bytes) {
-  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  const auto found = std::find_if(formats.begin(), formats.end(),
-                                  [&](const Format& format) { return text.starts_with(format.magic); });
-  return found == formats.end() ? nullptr : &*found;
+AVCodecID codec_of(PictureFormat format) {
+  switch (format) {
+    case PictureFormat::bmp:
+      return AV_CODEC_ID_BMP;
+    case PictureFormat::pnm:
+      return AV_CODEC_ID_PPM;
+    case PictureFormat::webp:
+      return AV_CODEC_ID_WEBP;
+    default:
+      return AV_CODEC_ID_NONE;
+  }
 }
 
 libav::Packet packet_of(std::span<const std::uint8_t> bytes) {
@@ -117,16 +112,11 @@ cv::Mat pixels_of(const libav::Frame& decoded) {
 
 }  // namespace
 
-std::string libav_format(std::span<const std::uint8_t> bytes) {
-  const Format* format = format_of(bytes);
-  return format ? std::string(format->name) : "";
-}
-
 cv::Mat libav_decode(std::span<const std::uint8_t> bytes) {
-  const Format* format = format_of(bytes);
-  if (!format) return {};
-  const cv::Mat pixels = pixels_of(decoded_frame(format->codec, bytes, 0));
-  const cv::Mat again = pixels_of(decoded_frame(format->codec, bytes, 255));
+  const AVCodecID codec = codec_of(picture_format(bytes));
+  if (codec == AV_CODEC_ID_NONE) return {};
+  const cv::Mat pixels = pixels_of(decoded_frame(codec, bytes, 0));
+  const cv::Mat again = pixels_of(decoded_frame(codec, bytes, 255));
   const bool whole = !pixels.empty() && pixels.size() == again.size() && pixels.type() == again.type() &&
                      cv::norm(pixels, again, cv::NORM_INF) == 0;
   return whole ? pixels : cv::Mat();

@@ -2,15 +2,10 @@
 
 #include <cstdint>
 #include <span>
-#include <string>
 
 #include <opencv2/core.hpp>
 
 namespace lapservo::internal {
-
-/// The name of a format that libav_decode() reads, by an image's first bytes: "BMP", "PNM", "WebP"; empty for
-/// anything else.
-std::string libav_format(std::span<const std::uint8_t> bytes);
 
 /// A BMP, PNM or WebP by FFmpeg's decoders: grey or BGR of 8 or 16 bits, palettes looked up, alpha dropped. Empty
 /// when the decoder complains or leaves out pixels, and for other formats.

@@ -86,11 +86,9 @@ Reading reading_of(const std::vector<std::string>& names) {
   std::set<std::size_t> counts;
   bool any_ends_in_zero = false;
   for (const std::string& name : names)
-    for (std::size_t at = name.find_first_of(digits); at < name.size(); at = name.find_first_of(digits, at)) {
-      const std::string_view decimals = decimals_at(name, at);
-      if (!decimals.empty()) counts.insert(decimals.size());
-      any_ends_in_zero = any_ends_in_zero || (decimals.size() > 1 && decimals.back() == '0');
-      at += digits_at(name, at).size() + (decimals.empty() ? 0 : 1 + decimals.size());
+    for (const Part& part : parts_of(name, {true, {}})) {
+      if (!part.decimals.empty()) counts.insert(part.decimals.size());
+      any_ends_in_zero = any_ends_in_zero || (part.decimals.size() > 1 && part.decimals.back() == '0');
     }
   Reading reading{counts.size() < 2 || !any_ends_in_zero, {}};
   std::set<std::string> places;

@@ -39,12 +39,19 @@ double light_of(double value, const Transfer& transfer) {
   return value;
 }
 
-}  // namespace
-
 std::string name_of(const Transfer& transfer) {
   if (transfer.kind == Transfer::Kind::hlg) return "HLG";
   if (transfer.kind == Transfer::Kind::pq) return "PQ";
   return transfer.gamma == 1 ? "linear light" : fmt::format("gamma {:.2f}", transfer.gamma);
+}
+
+}  // namespace
+
+std::optional<Transfer> transfer_of_code(int code) {
+  constexpr int linear = 8, pq = 16, hlg = 18;
+  if (code == hlg) return Transfer{Transfer::Kind::hlg};
+  if (code == pq) return Transfer{Transfer::Kind::pq};
+  return code == linear ? std::optional(Transfer{}) : std::nullopt;
 }
 
 std::string remark_on_transfer(const Transfer& transfer) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include <opencv2/core.hpp>
@@ -14,8 +15,9 @@ struct Transfer {
   bool operator==(const Transfer&) const = default;
 };
 
-/// In words: "HLG".
-std::string name_of(const Transfer& transfer);
+/// By a code of ITU-T H.273, as PNG, FFmpeg and GStreamer have it; nullopt for those of cameras, which the rig's
+/// response describes.
+std::optional<Transfer> transfer_of_code(int code);
 
 /// That it is undone.
 std::string remark_on_transfer(const Transfer& transfer);

@@ -15,7 +15,7 @@
 #include "lapservo/geometry/response.h"
 #include "lapservo/io/frame_source.h"
 #include "lapservo/io/image_file.h"
-#include "lapservo/io/pictures/png_encoding.h"
+#include "lapservo/io/pictures/png_picture.h"
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
 #include "lapservo/testing/videos.h"

@@ -6,19 +6,9 @@
 
 #include "lapservo/core/angles.h"
 #include "lapservo/core/error.h"
-#include "lapservo/rig/instrument_index.h"
+#include "lapservo/rig/instruments.h"
 
 namespace lapservo::internal {
-namespace {
-
-std::size_t index_of(const std::string& name, const Rig& rig, const std::string& source) {
-  const auto index = instrument_index(rig, name);
-  if (!index) throw InputError(source, "instrument", name, "an instrument of the rig");
-  return *index;
-}
-
-}  // namespace
-
 std::vector<Configurations> configurations_from(const CsvTable& table, const Rig& rig, const std::string& source) {
   const std::size_t instruments = rig.instruments.size();
   if (table.rows() == 0 || table.rows() % instruments != 0)
@@ -28,8 +18,10 @@ std::vector<Configurations> configurations_from(const CsvTable& table, const Rig
   std::vector<std::size_t> named_in(instruments, frames.size());  // the last frame that has it
   for (std::size_t row = 0; row < table.rows(); ++row) {
     const std::size_t frame = row / instruments;
-    const std::size_t index =
-        table.has("instrument") ? index_of(table.text(row, "instrument"), rig, source) : row % instruments;
+    const auto found =
+        table.has("instrument") ? instrument_index(rig, table.text(row, "instrument")) : row % instruments;
+    if (!found) throw InputError(source, "instrument", table.text(row, "instrument"), "an instrument of the rig");
+    const std::size_t index = *found;
     if (named_in[index] == frame)
       throw InputError(source, "instrument", rig.instruments[index].name + " twice in frame " + std::to_string(frame),
                        "every instrument once a frame");

@@ -7,30 +7,23 @@
 namespace lapservo::internal {
 namespace {
 
-Rig two_instruments() {
+std::vector<Configurations> parse(std::string_view text) {
   Rig rig;
   rig.instruments.resize(2);
   rig.instruments[0].name = "PSM1";
   rig.instruments[1].name = "PSM2";
-  return rig;
+  return configurations_from(CsvTable::parse(text, "q.csv"), rig, "q.csv");
 }
 
-std::vector<Configurations> parse(std::string_view text) {
-  return configurations_from(CsvTable::parse(text, "q.csv"), two_instruments(), "q.csv");
-}
-
-TEST(ConfigurationCsv, RowsWithoutNamesAreInTheRigsOrder) {
+TEST(ConfigurationCsv, NamesDecideWhereARowBelongsOrElseTheRigsOrder) {
   const auto frames = parse("theta_rad,phi_rad,rho_m,psi_rad\n1,2,.3,4\n5,6,.7,8\n-1,-2,-.3,-4\n1,1,.1,1\n");
   ASSERT_EQ(frames.size(), 2U);
   EXPECT_EQ(frames[0][1].vector(), Eigen::Vector4d(5, 6, 0.7, 8));
   EXPECT_EQ(frames[1][0].vector(), Eigen::Vector4d(-1, -2, -0.3, -4));
-}
-
-TEST(ConfigurationCsv, NamesDecideWhereARowBelongs) {
-  const auto frames = parse("instrument,psi_rad,rho_m,phi_rad,theta_rad\nPSM2,4,.3,2,1\nPSM1,8,.7,6,5\n");
-  ASSERT_EQ(frames.size(), 1U);
-  EXPECT_EQ(frames[0][0].vector(), Eigen::Vector4d(5, 6, 0.7, 8));
-  EXPECT_EQ(frames[0][1].vector(), Eigen::Vector4d(1, 2, 0.3, 4));
+  const auto named = parse("instrument,psi_rad,rho_m,phi_rad,theta_rad\nPSM2,4,.3,2,1\nPSM1,8,.7,6,5\n");
+  ASSERT_EQ(named.size(), 1U);
+  EXPECT_EQ(named[0][0].vector(), Eigen::Vector4d(5, 6, 0.7, 8));
+  EXPECT_EQ(named[0][1].vector(), Eigen::Vector4d(1, 2, 0.3, 4));
 }
 
 TEST(ConfigurationCsv, RefusesWhatWouldLeaveAnInstrumentNowhere) {

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <optional>
+#include <tuple>
 #include <utility>
 
 #include <fmt/format.h>
@@ -21,25 +22,20 @@ class Numbers {
     if (!known_ || (value && !std::isfinite(*value))) value.reset();
     all_.push_back({value, decimals});
   }
-  void add_sigma(std::optional<double> value) { add(value, of_sigma); }
+  /// `get` of `from`, where that is known.
+  void add(int decimals, const auto& from, const auto& get) {
+    add(from ? std::optional<double>(get(*from)) : std::nullopt, decimals);
+  }
+  /// The same for each of `count`.
+  void add_each(Eigen::Index count, int decimals, const auto& from, const auto& get) {
+    for (Eigen::Index i = 0; i < count; ++i) add(decimals, from, [&](const auto& it) { return get(it, i); });
+  }
   std::vector<ObservationNumber> all() && { return std::move(all_); }
 
  private:
   bool known_;
   std::vector<ObservationNumber> all_;
 };
-
-void add_marker(Numbers& numbers, const std::optional<Observation::MarkerPose>& marker) {
-  const auto of_marker = [&](auto get) { return marker ? std::optional<double>(get(*marker)) : std::nullopt; };
-  for (Eigen::Index i = 0; i < 3; ++i)
-    numbers.add(of_marker([&](const auto& m) { return m.camera_from_marker.translation[i]; }), 8);
-  for (Eigen::Index i = 0; i < 4; ++i)  // x y z w
-    numbers.add(of_marker([&](const auto& m) { return m.camera_from_marker.rotation.coeffs()[i]; }), 8);
-  numbers.add_sigma(of_marker([](const auto& m) { return m.sigma_xy_m; }));
-  numbers.add_sigma(of_marker([](const auto& m) { return m.sigma_z_m; }));
-  numbers.add_sigma(of_marker([](const auto& m) { return m.sigma_axis_rad; }));
-  numbers.add_sigma(of_marker([](const auto& m) { return m.sigma_roll_rad; }));
-}
 
 }  // namespace
 
@@ -55,16 +51,15 @@ const char* const observation_csv_header =
 
 std::vector<ObservationNumber> observation_numbers(const Observation& observation) {
   Numbers numbers(observation);
-  const auto& rcm = observation.rcm;
-  const auto of_q = [&](auto get) { return rcm ? std::optional<double>(get(*rcm)) : std::nullopt; };
-  numbers.add(of_q([](const auto& r) { return r.q.theta_rad; }), 7);
-  numbers.add(of_q([](const auto& r) { return r.q.phi_rad; }), 7);
-  numbers.add(of_q([](const auto& r) { return r.q.rho_m; }), 8);
-  numbers.add(of_q([](const auto& r) { return r.q.psi_rad; }), 7);
+  const auto& [rcm, marker, tip] = std::tie(observation.rcm, observation.marker, observation.tip);
+  const auto root = [](const auto& of, Eigen::Index i) { return std::sqrt(of.covariance(i, i)); };
+  numbers.add(7, rcm, [](const auto& r) { return r.q.theta_rad; });
+  numbers.add(7, rcm, [](const auto& r) { return r.q.phi_rad; });
+  numbers.add(8, rcm, [](const auto& r) { return r.q.rho_m; });
+  numbers.add(7, rcm, [](const auto& r) { return r.q.psi_rad; });
   numbers.add(observation.tau_rad, 7);
-  for (Eigen::Index i = 0; i < 4; ++i)
-    numbers.add_sigma(of_q([&](const auto& r) { return std::sqrt(r.covariance(i, i)); }));
-  numbers.add_sigma(observation.sigma_tau_rad);
+  numbers.add_each(4, of_sigma, rcm, root);
+  numbers.add(observation.sigma_tau_rad, of_sigma);
   for (const Eigen::Vector2d& edge : observation.edges_raw_px) numbers.add(edge.x(), 4), numbers.add(edge.y(), 4);
   const Features& f = observation.features;
   numbers.add(f.s_rad, 7);
@@ -72,15 +67,15 @@ std::vector<ObservationNumber> observation_numbers(const Observation& observatio
   numbers.add(f.l_px, 4);
   numbers.add(f.d_px, 4);
   numbers.add(f.cross_ratio, 7);
-  add_marker(numbers, observation.marker);
-  numbers.add_sigma(rcm ? observation.p_false : std::nullopt);
-  const auto of_tip = [&](auto get) {
-    return observation.tip ? std::optional<double>(get(*observation.tip)) : std::nullopt;
-  };
-  for (Eigen::Index i = 0; i < 3; ++i)
-    numbers.add(of_tip([&](const auto& tip) { return tip.camera_from_tip.translation[i]; }), 8);
-  for (Eigen::Index i = 0; i < 3; ++i)
-    numbers.add_sigma(of_tip([&](const auto& tip) { return std::sqrt(tip.covariance(i, i)); }));
+  numbers.add_each(3, 8, marker, [](const auto& m, auto i) { return m.camera_from_marker.translation[i]; });
+  numbers.add_each(4, 8, marker, [](const auto& m, auto i) { return m.camera_from_marker.rotation.coeffs()[i]; });
+  numbers.add(of_sigma, marker, [](const auto& m) { return m.sigma_xy_m; });
+  numbers.add(of_sigma, marker, [](const auto& m) { return m.sigma_z_m; });
+  numbers.add(of_sigma, marker, [](const auto& m) { return m.sigma_axis_rad; });
+  numbers.add(of_sigma, marker, [](const auto& m) { return m.sigma_roll_rad; });
+  numbers.add(rcm ? observation.p_false : std::nullopt, of_sigma);
+  numbers.add_each(3, 8, tip, [](const auto& t, auto i) { return t.camera_from_tip.translation[i]; });
+  numbers.add_each(3, of_sigma, tip, root);
   return std::move(numbers).all();
 }
 
@@ -92,12 +87,6 @@ std::string observation_csv_row(int frame, double time_s, const std::string& fil
     if (value) row += decimals == of_sigma ? fmt::format("{:.4g}", *value) : fmt::format("{:.{}f}", *value, decimals);
   }
   return row;
-}
-
-ObservationCsv::ObservationCsv(const std::filesystem::path& path) : file_(path, observation_csv_header) {}
-
-void ObservationCsv::add(int frame, double time_s, const std::string& file, const Observation& observation) {
-  file_.add(observation_csv_row(frame, time_s, file, observation));
 }
 
 }  // namespace lapservo::internal

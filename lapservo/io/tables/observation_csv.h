@@ -1,16 +1,14 @@
 #pragma once
 
-#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "lapservo/core/row_file.h"
 #include "lapservo/vision/observation.h"
 
 namespace lapservo::internal {
 
-/// The header line of an observation CSV (docs/output.md), without the line's end.
+/// The header line of an observation CSV (docs/output.md), without the line's end: see RowFile.
 extern const char* const observation_csv_header;
 
 /// A number of a row, where it is known; of `decimals` digits after the point, or as a sigma below 0.
@@ -23,20 +21,5 @@ std::vector<ObservationNumber> observation_numbers(const Observation& observatio
 
 /// One row of it, without the line's end. Unknown values are empty fields.
 std::string observation_csv_row(int frame, double time_s, const std::string& file, const Observation& observation);
-
-/// A CSV of observations that appears under its name when committed; until then see RowFile.
-class ObservationCsv {
- public:
-  /// Throws InputError at once when `path` can't be written.
-  explicit ObservationCsv(const std::filesystem::path& path);
-  void add(int frame, double time_s, const std::string& file, const Observation& observation);
-  /// Throws InputError when it could not be written to its end.
-  void commit() { file_.commit(); }
-  /// See RowFile.
-  std::filesystem::path leave() { return file_.leave(); }
-
- private:
-  RowFile file_;
-};
 
 }  // namespace lapservo::internal

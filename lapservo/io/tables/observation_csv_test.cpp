@@ -119,12 +119,17 @@ std::vector<std::string> empty_columns(const CsvTable& table) {
   return empty;
 }
 
-TEST(ObservationCsv, ColumnsOfWhatIsNotThereAreEmpty) {
+TEST(ObservationCsv, ColumnsOfWhatIsNotThereOrNotFiniteAreEmpty) {
   Random random(seed);
   Observation unregistered = random_observation(random), without_pose = unregistered, without_tip = unregistered;
+  Observation not_finite = unregistered;
   unregistered.rcm.reset(), unregistered.features.r_px.reset();
   without_pose.marker.reset();
   without_tip.tip.reset();
+  not_finite.rcm->q.psi_rad = std::nan("");
+  not_finite.rcm->covariance(1, 1) = -1;  // whose root is NaN
+  not_finite.sigma_tau_rad = std::numeric_limits<double>::infinity();
+  not_finite.edges_raw_px[2].y() = std::nan("");
   EXPECT_EQ(empty_columns(table_of(unregistered)),
             (std::vector<std::string>{"theta_rad", "phi_rad", "rho_m", "psi_rad", "sigma_theta_rad", "sigma_phi_rad",
                                       "sigma_rho_m", "sigma_psi_rad", "r_px", "p_false"}));
@@ -132,6 +137,8 @@ TEST(ObservationCsv, ColumnsOfWhatIsNotThereAreEmpty) {
   EXPECT_EQ(
       empty_columns(table_of(without_tip)),
       (std::vector<std::string>{"tip_x_m", "tip_y_m", "tip_z_m", "sigma_tip_x_m", "sigma_tip_y_m", "sigma_tip_z_m"}));
+  EXPECT_EQ(empty_columns(table_of(not_finite)),
+            (std::vector<std::string>{"psi_rad", "sigma_phi_rad", "sigma_tau_rad", "e2_v_px"}));
 }
 
 TEST(ObservationCsv, WithoutAnObservationEveryMeasurementIsEmpty) {
@@ -145,17 +152,6 @@ TEST(ObservationCsv, WithoutAnObservationEveryMeasurementIsEmpty) {
     EXPECT_EQ(table.text(0, "instrument"), "PSM1");
     EXPECT_EQ(empty_columns(table).size(), 41U) << to_string(status);
   }
-}
-
-TEST(ObservationCsv, WhatIsNotFiniteIsUnknown) {
-  Random random(seed);
-  Observation o = random_observation(random);
-  o.rcm->q.psi_rad = std::nan("");
-  o.rcm->covariance(1, 1) = -1;  // whose root is NaN
-  o.sigma_tau_rad = std::numeric_limits<double>::infinity();
-  o.edges_raw_px[2].y() = std::nan("");
-  EXPECT_EQ(empty_columns(table_of(o)),
-            (std::vector<std::string>{"psi_rad", "sigma_phi_rad", "sigma_tau_rad", "e2_v_px"}));
 }
 
 TEST(ObservationCsv, NamesMayHoldCommasAndQuotes) {

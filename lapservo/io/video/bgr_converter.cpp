@@ -1,8 +1,10 @@
 #include "lapservo/io/video/bgr_converter.h"
 
+#include <algorithm>
 #include <utility>
 
 extern "C" {
+#include <libavutil/imgutils.h>
 #include <libavutil/opt.h>
 #include <libavutil/pixdesc.h>
 }
@@ -10,43 +12,19 @@ extern "C" {
 namespace lapservo::internal {
 namespace {
 
+static_assert(static_cast<int>(YuvMatrix::bt709) == SWS_CS_ITU709 && static_cast<int>(YuvMatrix::fcc) == SWS_CS_FCC &&
+              static_cast<int>(YuvMatrix::bt601) == SWS_CS_ITU601 &&
+              static_cast<int>(YuvMatrix::smpte240m) == SWS_CS_SMPTE240M &&
+              static_cast<int>(YuvMatrix::bt2020) == SWS_CS_BT2020);
+
 // Where chroma's first sample lies beside luma's, in 1/256 of a pixel of luma.
 struct Place {
   int column = 0, row = 0;
 };
 
 Place place_of(ChromaSite site) {
-  switch (site) {
-    case ChromaSite::left:
-      return {0, 128};
-    case ChromaSite::centre:
-      return {128, 128};
-    case ChromaSite::top_left:
-      return {0, 0};
-    case ChromaSite::top:
-      return {128, 0};
-    case ChromaSite::bottom_left:
-      return {0, 256};
-    case ChromaSite::bottom:
-      return {128, 256};
-  }
-  return {};
-}
-
-int coefficients_of(YuvMatrix matrix) {
-  switch (matrix) {
-    case YuvMatrix::bt601:
-      return SWS_CS_ITU601;
-    case YuvMatrix::bt709:
-      return SWS_CS_ITU709;
-    case YuvMatrix::bt2020:
-      return SWS_CS_BT2020;
-    case YuvMatrix::fcc:
-      return SWS_CS_FCC;
-    case YuvMatrix::smpte240m:
-      return SWS_CS_SMPTE240M;
-  }
-  return SWS_CS_ITU601;
+  constexpr std::array<Place, 7> places{{{}, {0, 128}, {128, 128}, {0, 0}, {128, 0}, {0, 256}, {128, 256}}};
+  return places.at(static_cast<std::size_t>(site));
 }
 
 bool is_rgb(const AVPixFmtDescriptor& format) {
@@ -82,7 +60,7 @@ libav::Scaler scaler_of(const cv::Size& size, AVPixelFormat format, const Place&
 
 void set_colours(SwsContext& scaler, const YuvColours& colours) {
   constexpr int unity = 1 << 16;
-  sws_setColorspaceDetails(&scaler, sws_getCoefficients(coefficients_of(colours.matrix)), colours.full_range ? 1 : 0,
+  sws_setColorspaceDetails(&scaler, sws_getCoefficients(static_cast<int>(colours.matrix)), colours.full_range ? 1 : 0,
                            sws_getCoefficients(SWS_CS_DEFAULT), 1, 0, unity, unity);
 }
 
@@ -98,23 +76,22 @@ AVPixelFormat target_of(bool to_planes, bool deep) {
   return deep ? AV_PIX_FMT_BGR48 : AV_PIX_FMT_BGR24;
 }
 
+AVPixelFormat format_of(YuvPicture::Layout layout) {
+  constexpr std::array formats{AV_PIX_FMT_YUYV422, AV_PIX_FMT_UYVY422, AV_PIX_FMT_NV12,
+                               AV_PIX_FMT_YUV420P, AV_PIX_FMT_YUV422P, AV_PIX_FMT_YUV444P};
+  return formats.at(static_cast<std::size_t>(layout));
+}
+
 }  // namespace
 
 AVPixelFormat pixel_format_of(const AVFrame& frame) {
-  switch (frame.format) {
-    case AV_PIX_FMT_YUVJ420P:
-      return AV_PIX_FMT_YUV420P;
-    case AV_PIX_FMT_YUVJ422P:
-      return AV_PIX_FMT_YUV422P;
-    case AV_PIX_FMT_YUVJ444P:
-      return AV_PIX_FMT_YUV444P;
-    case AV_PIX_FMT_YUVJ440P:
-      return AV_PIX_FMT_YUV440P;
-    case AV_PIX_FMT_YUVJ411P:
-      return AV_PIX_FMT_YUV411P;
-    default:
-      return static_cast<AVPixelFormat>(frame.format);
-  }
+  using Pair = std::pair<AVPixelFormat, AVPixelFormat>;
+  constexpr std::array full_range{
+      Pair{AV_PIX_FMT_YUVJ420P, AV_PIX_FMT_YUV420P}, Pair{AV_PIX_FMT_YUVJ422P, AV_PIX_FMT_YUV422P},
+      Pair{AV_PIX_FMT_YUVJ444P, AV_PIX_FMT_YUV444P}, Pair{AV_PIX_FMT_YUVJ440P, AV_PIX_FMT_YUV440P},
+      Pair{AV_PIX_FMT_YUVJ411P, AV_PIX_FMT_YUV411P}};
+  const auto found = std::ranges::find(full_range, frame.format, &Pair::first);
+  return found != full_range.end() ? found->second : static_cast<AVPixelFormat>(frame.format);
 }
 
 // To planes where there is chroma: three times as fast as to BGR, where swscale takes chroma from the wrong rows
@@ -168,6 +145,29 @@ bool BgrConverter::convert(const AVFrame& frame, const YuvColours& colours, bool
   if (to_planes) cv::merge(std::array{planes_[1], planes_[0], planes_[2]}, whole);
   if (colours.transfer) srgb_of(deep, *colours.transfer).copyTo(bgr);
   return true;
+}
+
+std::optional<YuvMatrix> yuv_matrix_of(int code) {
+  constexpr int bt601_525 = 6;  // the same matrix as for 625 lines
+  constexpr std::array codes{YuvMatrix::bt709, YuvMatrix::fcc, YuvMatrix::bt601, YuvMatrix::smpte240m,
+                             YuvMatrix::bt2020};
+  const auto matrix = static_cast<YuvMatrix>(code == bt601_525 ? static_cast<int>(YuvMatrix::bt601) : code);
+  return std::ranges::find(codes, matrix) != codes.end() ? std::optional(matrix) : std::nullopt;
+}
+
+// swscale reads beyond the ends of rows: a copy has room for that.
+bool convert_to_bgr(const YuvPicture& picture, const YuvColours& colours, cv::Mat& bgr) {
+  thread_local BgrConverter converter;  // which serves images of one kind after another
+  const AVPixelFormat format = format_of(picture.layout);
+  const libav::Frame frame(av_frame_alloc());
+  if (!frame) return false;
+  frame->width = picture.size.width;
+  frame->height = picture.size.height;
+  frame->format = format;
+  if (av_frame_get_buffer(frame.get(), 0) < 0) return false;
+  auto planes = picture.planes;
+  av_image_copy(frame->data, frame->linesize, planes.data(), picture.steps.data(), format, frame->width, frame->height);
+  return converter.convert(*frame, colours, picture.by_field, bgr);
 }
 
 }  // namespace lapservo::internal

@@ -1,11 +1,13 @@
 #pragma once
 
 #include <filesystem>
-#include <memory>
+#include <optional>
 
 #include <opencv2/core.hpp>
 
+#include "lapservo/core/new_folder.h"
 #include "lapservo/io/frame_source.h"
+#include "lapservo/io/video/video_writer.h"
 
 namespace lapservo::internal {
 
@@ -13,13 +15,18 @@ namespace lapservo::internal {
 /// video for videos and cameras. Images appear whole, one by one; a video when committed.
 class OverlayWriter {
  public:
-  virtual ~OverlayWriter() = default;
-  virtual void add(const Frame& frame, const cv::Mat& overlay) = 0;
-  virtual void commit() = 0;
-  virtual bool is_video() const { return false; }
-};
+  /// Throws InputError at once when PATH can't be written.
+  OverlayWriter(const std::filesystem::path& path, const FrameSource& source);
 
-/// Throws InputError at once when PATH can't be written.
-std::unique_ptr<OverlayWriter> open_overlay_writer(const std::filesystem::path& path, const FrameSource& source);
+  void add(const Frame& frame, const cv::Mat& overlay);
+  void commit();
+  bool is_video() const { return video_.has_value(); }
+
+ private:
+  std::filesystem::path picture_;  // of these three one
+  std::optional<NewFolder> folder_;
+  std::optional<VideoWriter> video_;
+  std::optional<double> start_s_;  // the first frame's time
+};
 
 }  // namespace lapservo::internal

@@ -134,8 +134,6 @@ INSTANTIATE_TEST_SUITE_P(
                                          Colours{"bt2020", "bt2020nc", "tv"}, Colours{"smpte240m", "smpte240m", "tv"}),
                        ::testing::Values(Coding{"-c:v libx264 -qp 0 -pix_fmt yuv444p", "mp4"},
                                          Coding{"-c:v libx264 -crf 2 -pix_fmt yuv420p", "mkv"},
-                                         Coding{"-c:v libx265 -x265-params lossless=1:log-level=-1 -pix_fmt yuv444p",
-                                                "mp4"},
                                          Coding{"-c:v libvpx-vp9 -lossless 1 -pix_fmt yuv444p", "webm"},
                                          Coding{"-c:v ffv1 -pix_fmt yuv422p", "mkv"},
                                          Coding{"-c:v prores_ks -profile:v 4444 -pix_fmt yuv444p10le", "mov"})));

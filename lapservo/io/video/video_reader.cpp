@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdint>
+#include <filesystem>
 #include <fstream>
 #include <string_view>
 #include <utility>
@@ -21,7 +22,7 @@ extern "C" {
 
 #include "lapservo/core/error.h"
 #include "lapservo/io/pictures/jpeg_picture.h"
-#include "lapservo/io/tables/numbers.h"
+#include "lapservo/io/pictures/picture_parts.h"
 #include "lapservo/io/video/bgr_converter.h"
 #include "lapservo/io/video/libav.h"
 #include "lapservo/io/video/yuv_colours.h"
@@ -52,25 +53,15 @@ bool lacks_index(const std::filesystem::path& path) {
   return is_mp4;
 }
 
-void refuse_known(const std::filesystem::path& path) {
-  if (lacks_index(path))
-    throw InputError(
-        path.string(),
-        "has no index (moov), as of a recorder that was switched off: untrunc GOOD.mp4 FILE repairs it by a "
-        "whole video of the same recorder");
-}
-
 bool turned(const AVStream& stream) {
   const std::uint8_t* matrix = av_stream_get_side_data(&stream, AV_PKT_DATA_DISPLAYMATRIX, nullptr);
   return matrix && std::abs(av_display_rotation_get(reinterpret_cast<const std::int32_t*>(matrix))) > 1;
 }
 
-}  // namespace
-
-class VideoReader::State {
+class Video : public FrameSource {
  public:
-  State(const std::filesystem::path& path, std::chrono::milliseconds patience, Kind kind, const VideoReading& reading)
-      : source_(path.string()),
+  Video(const std::string& name, Kind kind, const VideoReading& reading, std::chrono::milliseconds patience)
+      : source_(name),
         kind_(kind),
         patience_(patience),
         fields_(reading.deinterlaced),
@@ -81,20 +72,17 @@ class VideoReader::State {
     if (turned(*stream_))
       throw InputError(source_, "is to be turned for display, expected the camera's pixels upright");
     open_decoder();
+    first_ = read();
+    if (!first_)
+      throw InputError(source_, is_stream() ? "gives no frames, expected a stream" : "has no frames, expected a video");
   }
 
-  std::optional<Image> next() {
-    while (true) {
-      const int got = avcodec_receive_frame(decoder_.get(), frame_.get());
-      if (got == 0) return delivered();
-      if (got == AVERROR_EOF) return std::nullopt;
-      if (got != AVERROR(EAGAIN)) return lost();
-      if (!feed()) return lost();
-    }
-  }
+  std::optional<Frame> next() override { return first_ ? std::exchange(first_, std::nullopt) : read(); }
+  Kind kind() const override { return kind_; }
 
   // Where the container doesn't hold the count: from its duration, unless that is a guess from the last packet.
-  std::optional<int> frame_count() const {
+  std::optional<int> frame_count() const override {
+    if (is_stream()) return std::nullopt;
     if (stream_->nb_frames > 0) return static_cast<int>(std::min<std::int64_t>(stream_->nb_frames, 1'000'000'000));
     if (format_->duration_estimation_method != AVFMT_DURATION_FROM_STREAM || format_->duration <= 0)
       return std::nullopt;
@@ -102,20 +90,20 @@ class VideoReader::State {
     return count > 0 && count < 1e9 ? std::optional(static_cast<int>(std::lround(count))) : std::nullopt;
   }
 
-  double frames_per_second() const {
+  double frames_per_second() const override {
     const double fps = av_q2d(av_guess_frame_rate(format_.get(), stream_, nullptr));
     return fps > 0 && fps < 10000 ? fps : 30;
   }
 
-  const std::string& remark() const { return remark_; }
-  bool is_srgb() const { return is_srgb_; }
-  bool is_lossy() const {
+  std::string remark() const override { return remark_; }
+  bool is_srgb() const override { return is_srgb_; }
+  bool is_lossy() const override {
     const AVCodecDescriptor* codec = avcodec_descriptor_get(stream_->codecpar->codec_id);
     return codec && (codec->props & AV_CODEC_PROP_LOSSY) != 0;
   }
 
-  std::string complaint() const {
-    if (kind_ == Kind::stream)
+  std::string complaint() const override {
+    if (is_stream())
       return broke_off_ ? fmt::format("broke off, or was silent for {} s, after {:.2f} s",
                                       std::chrono::duration<double>(patience_).count(), end_s_)
                         : "";
@@ -129,6 +117,18 @@ class VideoReader::State {
   }
 
  private:
+  bool is_stream() const { return kind_ == Kind::live; }
+
+  std::optional<Frame> read() {
+    while (true) {
+      const int got = avcodec_receive_frame(decoder_.get(), frame_.get());
+      if (got == 0) return delivered();
+      if (got == AVERROR_EOF) return std::nullopt;
+      if (got != AVERROR(EAGAIN)) return lost();
+      if (!feed()) return lost();
+    }
+  }
+
   // By the distance of their sync bytes, as FFmpeg found it: 188, 192 in a camcorder's .mts, 204 with error correction.
   // 1 for other containers.
   std::int64_t transport_packet_bytes() const {
@@ -143,18 +143,21 @@ class VideoReader::State {
     AVFormatContext* format = avformat_alloc_context();
     format->interrupt_callback = {past, &deadline_};
     AVDictionary* options = nullptr;
-    if (kind_ == Kind::stream) av_dict_set(&options, "rtsp_transport", "tcp", 0);  // which loses nothing
+    if (is_stream()) av_dict_set(&options, "rtsp_transport", "tcp", 0);  // which loses nothing
     const bool opened = avformat_open_input(&format, url().c_str(), nullptr, &options) == 0;
     av_dict_free(&options);
     format_.reset(opened ? format : nullptr);
-    if (!opened && kind_ == Kind::file) refuse_known(source_);
+    if (!opened && !is_stream() && lacks_index(source_))
+      throw InputError(source_,
+                       "has no index (moov), as of a recorder that was switched off: untrunc GOOD.mp4 FILE repairs it "
+                       "by a whole video of the same recorder");
     if (!opened || avformat_find_stream_info(format, nullptr) < 0)
-      throw InputError(source_, kind_ == Kind::file ? "can't be read, expected an image or a video"
-                                                    : "can't be opened, expected a camera or stream");
+      throw InputError(source_, is_stream() ? "can't be opened, expected a camera or stream"
+                                            : "can't be read, expected an image or a video");
     deadline_ = Clock::time_point::max();  // the file keeps asking; whoever measures slowly is not late
   }
 
-  std::string url() const { return kind_ == Kind::file ? libav::url_of(source_) : source_; }
+  std::string url() const { return is_stream() ? source_ : libav::url_of(source_); }
 
   // The first, whatever the others' sizes and bit rates are: recorders of two eyes may write a track for each.
   std::size_t choose_stream() {
@@ -188,7 +191,7 @@ class VideoReader::State {
 
   // Gives the decoder its next packet; false when it complains of it.
   bool feed() {
-    if (kind_ == Kind::stream) deadline_ = Clock::now() + patience_;
+    if (is_stream()) deadline_ = Clock::now() + patience_;
     int read = 0;
     while ((read = av_read_frame(format_.get(), packet_.get())) >= 0) {
       const bool ours = packet_->stream_index == stream_->index;
@@ -200,7 +203,7 @@ class VideoReader::State {
       av_packet_unref(packet_.get());
       if (ours) return sent >= 0 || sent == AVERROR(EAGAIN);
     }
-    broke_off_ = kind_ == Kind::stream && read != AVERROR_EOF;
+    broke_off_ = is_stream() && read != AVERROR_EOF;
     return avcodec_send_packet(decoder_.get(), nullptr) >= 0;
   }
 
@@ -241,7 +244,7 @@ class VideoReader::State {
   }
 
   // Frames predicted from a damaged one are damaged too, up to the next that stands alone.
-  Image delivered() {
+  Frame delivered() {
     const bool flawed = (frame_->flags & AV_FRAME_FLAG_CORRUPT) != 0 || frame_->decode_error_flags != 0;
     const bool packet_flawed = std::exchange(tainted_, false);
     spoiled_ = flawed || packet_flawed || (spoiled_ && frame_->key_frame == 0);
@@ -250,17 +253,16 @@ class VideoReader::State {
     av_frame_unref(frame_.get());
     return counted(spoiled_, last_);
   }
-  Image lost() {
+  Frame lost() {
     spoiled_ = true;
     if (last_.empty())
       last_ = cv::Mat::zeros(std::max(1, stream_->codecpar->height), std::max(1, stream_->codecpar->width), CV_8UC3);
     advance(AV_NOPTS_VALUE, 0);
     return counted(true, last_.clone());
   }
-  Image counted(bool damaged, const cv::Mat& bgr) {
-    ++frames_;
+  Frame counted(bool damaged, const cv::Mat& bgr) {
     damaged_ += damaged ? 1 : 0;
-    return {bgr, damaged, time_s_.value_or(0)};
+    return {bgr, frames_++, time_s_.value_or(0), {}, damaged ? std::optional(Status::damaged) : std::nullopt};
   }
 
   // Frames that the container gives no time, or none later than the frame before, follow at the stream's rate.
@@ -308,7 +310,7 @@ class VideoReader::State {
     const AVInputFormat& container = *format_->iformat;
     const bool has_times =
         (container.flags & AVFMT_NOTIMESTAMPS) == 0 && !std::string_view(container.name).ends_with("_pipe");
-    return kind_ == Kind::file && !has_times && decoder_->framerate.num <= 0;
+    return !is_stream() && !has_times && decoder_->framerate.num <= 0;
   }
 
   // By each frame's own tags: a stream's may change.
@@ -342,6 +344,7 @@ class VideoReader::State {
   BgrConverter converter_;
   AVStream* stream_ = nullptr;
   cv::Mat last_;
+  std::optional<Frame> first_;    // until it is given
   std::optional<double> time_s_;  // of the last frame, since the first
   double end_s_ = 0;              // of the last frame
   double end_of_all_s_ = 0;       // of all streams, where they have one duration
@@ -353,31 +356,11 @@ class VideoReader::State {
   bool spoiled_ = false;  // the last frame is damaged
 };
 
-VideoReader::VideoReader(const std::filesystem::path& path, std::chrono::milliseconds patience, Kind kind,
-                         const VideoReading& reading)
-    : state_(std::make_unique<State>(path, patience, kind, reading)) {}
-VideoReader::~VideoReader() = default;
+}  // namespace
 
-std::optional<VideoReader::Image> VideoReader::next() {
-  return state_->next();
-}
-std::optional<int> VideoReader::frame_count() const {
-  return state_->frame_count();
-}
-double VideoReader::frames_per_second() const {
-  return state_->frames_per_second();
-}
-std::string VideoReader::remark() const {
-  return state_->remark();
-}
-bool VideoReader::is_lossy() const {
-  return state_->is_lossy();
-}
-bool VideoReader::is_srgb() const {
-  return state_->is_srgb();
-}
-std::string VideoReader::complaint() const {
-  return state_->complaint();
+std::unique_ptr<FrameSource> open_video(const std::string& name, FrameSource::Kind kind, const VideoReading& reading,
+                                        std::chrono::milliseconds patience) {
+  return std::make_unique<Video>(name, kind, reading, patience);
 }
 
 }  // namespace lapservo::internal

@@ -17,27 +17,10 @@ extern "C" {
 namespace lapservo::internal {
 namespace {
 
-template <typename Key, typename Value>
-std::optional<Value> found_in(const std::map<Key, Value>& values, const Key& key) {
+template <typename Value>
+std::optional<Value> found_in(const std::map<std::string, Value>& values, const std::string& key) {
   const auto found = values.find(key);
   return found == values.end() ? std::nullopt : std::optional(found->second);
-}
-
-std::optional<YuvMatrix> matrix_of(AVColorSpace tag) {
-  static const std::map<AVColorSpace, YuvMatrix> matrices{
-      {AVCOL_SPC_BT470BG, YuvMatrix::bt601},       {AVCOL_SPC_SMPTE170M, YuvMatrix::bt601},
-      {AVCOL_SPC_BT709, YuvMatrix::bt709},         {AVCOL_SPC_FCC, YuvMatrix::fcc},
-      {AVCOL_SPC_SMPTE240M, YuvMatrix::smpte240m}, {AVCOL_SPC_BT2020_NCL, YuvMatrix::bt2020}};
-  return found_in(matrices, tag);
-}
-
-// Others are as cameras encode light, which the rig's response describes.
-std::optional<Transfer> transfer_of(AVColorTransferCharacteristic tag) {
-  static const std::map<AVColorTransferCharacteristic, Transfer> transfers{
-      {AVCOL_TRC_LINEAR, {Transfer::Kind::power, 1}},
-      {AVCOL_TRC_ARIB_STD_B67, {Transfer::Kind::hlg}},
-      {AVCOL_TRC_SMPTE2084, {Transfer::Kind::pq}}};
-  return found_in(transfers, tag);
 }
 
 // Some cameras' streams say RGB of YUV.
@@ -62,11 +45,9 @@ ChromaSite usual_site(AVCodecID codec, AVColorSpace matrix) {
 
 // Decoders of H.264, H.265 and MPEG-4 say left where the stream says nothing.
 ChromaSite site_of(const AVFrame& frame, AVCodecID codec, bool from_rgb) {
-  static const std::map<AVChromaLocation, ChromaSite> sites{
-      {AVCHROMA_LOC_CENTER, ChromaSite::centre}, {AVCHROMA_LOC_TOPLEFT, ChromaSite::top_left},
-      {AVCHROMA_LOC_TOP, ChromaSite::top},       {AVCHROMA_LOC_BOTTOMLEFT, ChromaSite::bottom_left},
-      {AVCHROMA_LOC_BOTTOM, ChromaSite::bottom}, {AVCHROMA_LOC_LEFT, ChromaSite::left}};
-  const auto site = found_in(sites, frame.chroma_location);
+  static_assert(static_cast<int>(ChromaSite::bottom) == AVCHROMA_LOC_BOTTOM);
+  const bool is_known = frame.chroma_location >= AVCHROMA_LOC_LEFT && frame.chroma_location <= AVCHROMA_LOC_BOTTOM;
+  const auto site = is_known ? std::optional(static_cast<ChromaSite>(frame.chroma_location)) : std::nullopt;
   if (from_rgb && (!site || *site == ChromaSite::left)) return ChromaSite::centre;
   return site.value_or(usual_site(codec, frame.colorspace));
 }
@@ -120,19 +101,19 @@ GivenColours given_colours(const std::string& colour_matrix, const std::string& 
 
 std::optional<YuvColours> yuv_colours_of(const AVFrame& frame, AVCodecID codec, bool of_software,
                                          const GivenColours& given) {
-  if (is_rgb(frame)) return YuvColours{.transfer = transfer_of(frame.color_trc)};
+  if (is_rgb(frame)) return YuvColours{.transfer = transfer_of_code(frame.color_trc)};
   const bool from_rgb = of_software && names_no_matrix(frame);
   YuvColours colours;
   if (given.matrix) {
     colours.matrix = *given.matrix;
   } else if (names_no_matrix(frame)) {
     colours.matrix = from_rgb ? YuvMatrix::bt601 : usual_matrix(frame.height);
-  } else if (const auto matrix = matrix_of(frame.colorspace)) {
+  } else if (const auto matrix = yuv_matrix_of(frame.colorspace)) {
     colours.matrix = *matrix;
   } else {
     return std::nullopt;
   }
-  colours.transfer = transfer_of(frame.color_trc);
+  colours.transfer = transfer_of_code(frame.color_trc);
   colours.full_range = pixel_format_of(frame) != frame.format || frame.color_range == AVCOL_RANGE_JPEG;
   colours.chroma = given.chroma.value_or(site_of(frame, codec, from_rgb));
   return colours;

@@ -10,12 +10,15 @@
 
 namespace lapservo::internal {
 
-enum class YuvMatrix { bt601, bt709, bt2020, fcc, smpte240m };
+/// By their codes in ITU-T H.273, which are also FFmpeg's.
+enum class YuvMatrix { bt709 = 1, fcc = 4, bt601 = 5, smpte240m = 7, bt2020 = 9 };
+/// nullopt for other codes.
+std::optional<YuvMatrix> yuv_matrix_of(int code);
 
 /// Where the first sample of chroma lies, as seen from the first pixel of luma: on its column (left) or half a pixel
 /// to the right of it, on its row (top), half a pixel below it or a pixel below it (bottom). Concerns only directions
-/// in which chroma has fewer samples than luma.
-enum class ChromaSite { left, centre, top_left, top, bottom_left, bottom };
+/// in which chroma has fewer samples than luma. By FFmpeg's codes (AVChromaLocation).
+enum class ChromaSite { left = 1, centre, top_left, top, bottom_left, bottom };
 
 /// How luma and chroma become red, green and blue, and these sRGB.
 struct YuvColours {

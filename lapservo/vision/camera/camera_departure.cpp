@@ -11,15 +11,16 @@ namespace lapservo::internal {
 namespace {
 
 constexpr const DepartureLimits& believed = departure_limits;
-constexpr Look in_light{24, 1, Between::light};
 
 // A step at the samples of an edge, about its mean; and its density, which moves it, apart from step and mean.
 struct StepColumns {
+  const PooledEdge& edge;
+  float blur_px;
   std::array<float, PooledEdge::samples> step, density;
   std::size_t first, last;
   float step_square = 0, density_square = 0;
 
-  StepColumns(const PooledEdge& edge, float blur_px) {
+  StepColumns(const PooledEdge& of_edge, float of_blur_px) : edge(of_edge), blur_px(of_blur_px) {
     const int reach = std::min(edge.clear_px, believed.reach_px);
     first = static_cast<std::size_t>(PooledEdge::reach - reach);
     last = static_cast<std::size_t>(PooledEdge::reach + reach);
@@ -52,41 +53,48 @@ struct ChannelSteps {
 };
 
 template <typename LightOf>
-ChannelSteps channel_steps(const StepColumns& columns, const PooledEdge& edge, float blur_px, const LightOf& light_of) {
+ChannelSteps channel_steps(const StepColumns& columns, const LightOf& light_of) {
   Channels step, density;
   for (std::size_t c = 0; c < 3; ++c) {
     float by_step = 0, by_density = 0;
     for (std::size_t i = columns.first; i <= columns.last; ++i) {
-      const float light = light_of(edge.value[c][i]);
+      const float light = light_of(columns.edge.value[c][i]);
       by_step += columns.step[i] * light, by_density += columns.density[i] * light;
     }
     const auto channel = static_cast<Eigen::Index>(c);
     step[channel] = static_cast<double>(by_step / columns.step_square);
     density[channel] = static_cast<double>(by_density / columns.density_square);
   }
-  ChannelSteps out{-static_cast<double>(blur_px) * density / step, step};
+  const auto blur_px = static_cast<double>(columns.blur_px);
+  ChannelSteps out{-blur_px * density / step, step};
   // Specular light is white: it shows alone in a channel in which both sides of the edge look alike.
   Eigen::Index alike = 0;
   if (step.abs().minCoeff(&alike) < believed.least_step * step.abs().maxCoeff())
-    out.gloss_px = static_cast<double>(blur_px) * std::abs(density[alike]) / step.abs();
+    out.gloss_px = blur_px * std::abs(density[alike]) / step.abs();
   return out;
 }
 
 struct SeenBoundary {
-  const PooledEdge* edge;
-  double radial_px;                            // how far from the principal point it lies along its normal
-  Channels offset_px, weight, share;           // share: of what fit_step sees there
-  Channels by_exponent_px = Channels::Zero();  // d(offset)/d(exponent)
-  int channels;                                // that show it
+  std::size_t boundary;
+  double radial_px;                   // how far from the principal point it lies along its normal
+  Channels offset_px, weight, share;  // share: of what fit_step sees there
+  Channels by_exponent_px;            // d(offset)/d(exponent)
+  int channels;                       // that show it
 
-  SeenBoundary(const PooledEdge& of_edge, double of_radial_px, const ChannelSteps& steps)
-      : edge(&of_edge), radial_px(of_radial_px), offset_px(steps.offset_px) {
+  template <typename LightOf>
+  SeenBoundary(const StepColumns& columns, double of_radial_px, const LightOf& light_of)
+      : boundary(columns.edge.boundary), radial_px(of_radial_px) {
+    const ChannelSteps steps = channel_steps(columns, light_of);
     const Channels of_most = steps.step.abs() / steps.step.abs().maxCoeff();
-    const Eigen::Array<bool, 3, 1> shown = of_most > believed.least_step && offset_px.abs() < believed.farthest_px;
+    const Eigen::Array<bool, 3, 1> shown =
+        of_most > believed.least_step && steps.offset_px.abs() < believed.farthest_px;
     const Channels variance_px2 =
         believed.floor_px * believed.floor_px + (believed.sigma_px / of_most).square() + steps.gloss_px.square();
     weight = shown.select(variance_px2.inverse(), 0);
-    offset_px = shown.select(offset_px, 0);
+    offset_px = shown.select(steps.offset_px, 0);
+    const auto raised = [&](float value) { return std::pow(light_of(value), 1 + believed.exponent_step); };
+    const Channels there_px = channel_steps(columns, raised).offset_px;
+    by_exponent_px = (weight > 0).select((there_px - offset_px) / believed.exponent_step, 0);
     share = of_most.square() / of_most.square().sum();
     channels = static_cast<int>(shown.count());
   }
@@ -111,8 +119,7 @@ struct Disagreement {
 // The part of the offsets that a few numbers explain.
 template <int Numbers>
 struct Explanation {
-  using Vector = Eigen::Matrix<double, Numbers, 1>;
-  Vector found, sigma;
+  Eigen::Matrix<double, Numbers, 1> found, sigma;
   double scatter = 0;  // of what is left a degree, in squared sigmas
   double gain = 0;     // of a number, by the scatter
 };
@@ -122,17 +129,17 @@ struct Explanation {
 template <int Numbers, typename Pattern>
 Explanation<Numbers> explained(const SeenBoundaries& seen, const Disagreement& all, double usual,
                                double told_of_scatter, const Pattern& pattern) {
-  using Explained = Explanation<Numbers>;
-  Eigen::Matrix<double, Numbers, Numbers> information = decltype(information)::Identity() / (usual * usual);
-  typename Explained::Vector gradient = Explained::Vector::Zero();
+  using Square = Eigen::Matrix<double, Numbers, Numbers>;
+  Square information = Square::Identity() / (usual * usual);
+  Eigen::Matrix<double, Numbers, 1> gradient = decltype(gradient)::Zero();
   for (const SeenBoundary& boundary : seen)
     for (int i = 0; i < Numbers; ++i) {
       const Channels apart = boundary.weight * boundary.apart(pattern(boundary, i));
       for (int j = 0; j < Numbers; ++j) information(i, j) += (apart * pattern(boundary, j)).sum();
       gradient[i] += (apart * boundary.offset_px).sum();
     }
-  const Eigen::Matrix<double, Numbers, Numbers> covariance = information.inverse();
-  Explained out;
+  const Square covariance = information.inverse();
+  Explanation<Numbers> out;
   out.found = covariance * gradient;
   const double of_all = out.found.dot(gradient);
   out.scatter = (all.squares - of_all) / (all.degrees - Numbers);
@@ -153,7 +160,7 @@ std::array<double, 4> of_each_boundary(const SeenBoundaries& seen, const DoubtOf
   for (const SeenBoundary& boundary : seen) worst = std::max(worst, doubt_of(boundary));
   std::array<double, 4> doubts;
   doubts.fill(worst);
-  for (const SeenBoundary& boundary : seen) doubts[boundary.edge->boundary] = doubt_of(boundary);
+  for (const SeenBoundary& boundary : seen) doubts[boundary.boundary] = doubt_of(boundary);
   return doubts;
 }
 
@@ -165,13 +172,6 @@ CameraDeparture by_aberration(const SeenBoundaries& seen, const Explanation<2>& 
     return std::hypot(explanation.sigma[0] * boundary.share[0], explanation.sigma[1] * boundary.share[2]);
   });
   return out;
-}
-
-// It may be specular light or shading as well.
-CameraDeparture doubted_aberration(const SeenBoundaries& seen, Explanation<2> explanation) {
-  explanation.sigma = explanation.sigma.cwiseMax(explanation.found.cwiseAbs());
-  explanation.found.setZero();
-  return by_aberration(seen, explanation);
 }
 
 CameraDeparture by_exponent(const SeenBoundaries& seen, const Explanation<1>& explanation) {
@@ -189,48 +189,29 @@ template <typename LightOf>
 SeenBoundaries seen_in(const ChannelGeometry& channels, const PooledEdges& edges, double blur_px,
                        const LightOf& light_of) {
   const Eigen::Vector2f centre(channels.centre_u, channels.centre_v);
-  const auto blur = static_cast<float>(blur_px);
   SeenBoundaries seen;
   for (const PooledEdge& edge : edges.all) {
     if (!edge.is_seen()) continue;
     const double radial_px = static_cast<double>((edge.place_px - centre).dot(edge.normal));
-    const SeenBoundary boundary(edge, radial_px, channel_steps(StepColumns(edge, blur), edge, blur, light_of));
+    const SeenBoundary boundary(StepColumns(edge, static_cast<float>(blur_px)), radial_px, light_of);
     if (boundary.channels > 1) seen.push_back(boundary);
   }
   return seen;
 }
 
-void differ_by_exponent(double blur_px, SeenBoundaries& seen) {
-  const auto blur = static_cast<float>(blur_px);
-  const auto raised = [](float light) { return std::pow(light, 1 + believed.exponent_step); };
-  for (SeenBoundary& boundary : seen) {
-    const PooledEdge& edge = *boundary.edge;
-    const Channels there_px = channel_steps(StepColumns(edge, blur), edge, blur, raised).offset_px;
-    boundary.by_exponent_px = (boundary.weight > 0).select((there_px - boundary.offset_px) / believed.exponent_step, 0);
-  }
-}
-
 // Specular light beside one boundary looks like another response there; a camera's shows at all: most of it without any
 // of them.
 bool is_at_more_than_one(const SeenBoundaries& seen, double exponent) {
-  double information = 1 / (believed.usual_exponent * believed.usual_exponent), gradient = 0;
-  const auto add = [&](const SeenBoundary& boundary, double sign) {
-    const Channels apart = boundary.weight * boundary.apart(boundary.by_exponent_px);
-    information += sign * (apart * boundary.by_exponent_px).sum();
-    gradient += sign * (apart * boundary.offset_px).sum();
-  };
-  for (const SeenBoundary& boundary : seen) add(boundary, 1);
-  return std::all_of(seen.begin(), seen.end(), [&](const SeenBoundary& boundary) {
-    add(boundary, -1);
-    const double of_others = gradient / information;
-    add(boundary, 1);
-    return of_others / exponent > believed.least_of_others;
+  return std::all_of(seen.begin(), seen.end(), [&](const SeenBoundary& left_out) {
+    double information = 1 / (believed.usual_exponent * believed.usual_exponent), gradient = 0;
+    for (const SeenBoundary& boundary : seen) {
+      if (&boundary == &left_out) continue;
+      const Channels apart = boundary.weight * boundary.apart(boundary.by_exponent_px);
+      information += (apart * boundary.by_exponent_px).sum();
+      gradient += (apart * boundary.offset_px).sum();
+    }
+    return gradient / information / exponent > believed.least_of_others;
   });
-}
-
-bool is_response(const SeenBoundaries& seen, const Explanation<1>& response) {
-  return response.gain > believed.least_response_gain && response.scatter < believed.most_response_scatter &&
-         std::abs(response.found[0]) > believed.least_exponent && is_at_more_than_one(seen, response.found[0]);
 }
 
 }  // namespace
@@ -263,7 +244,7 @@ DepartedLight::DepartedLight(const LightImage& light, const CameraDeparture& dep
 }
 
 std::optional<CameraDeparture> find_departure(const LightImage& light, std::span<const Measurement> measurements,
-                                              const PooledEdges& glance, double blur_px) {
+                                              double blur_px) {
   const ChannelGeometry& channels = light.channels();
   if (!(channels.corner_px > 0)) return std::nullopt;  // of a frame whose middle nobody gave
   // For a value between two pixels: along straight lines.
@@ -272,32 +253,35 @@ std::optional<CameraDeparture> find_departure(const LightImage& light, std::span
     const auto i = static_cast<std::size_t>(place);
     return table[i] + (place - static_cast<float>(i)) * (table[i + 1] - table[i]);
   };
+  const PooledEdges glance = pool_edges(light, measurements, Look::glance);
   if (!Disagreement(seen_in(channels, glance, blur_px, light_of)).is_plain()) return std::nullopt;
   // Means of values have dark edges, which look like another response.
-  const PooledEdges edges = pool_edges(light, measurements, in_light);
-  SeenBoundaries seen = seen_in(channels, edges, blur_px, std::identity());
+  const PooledEdges edges = pool_edges(light, measurements, Look::light);
+  const SeenBoundaries seen = seen_in(channels, edges, blur_px, std::identity());
   const Disagreement all(seen);
   if (!all.is_plain()) return std::nullopt;
-  differ_by_exponent(blur_px, seen);
-  const auto aberration =
-      explained<2>(seen, all, believed.usual_aberration, believed.told_of_scatter, by_aberration_px);
+  auto aberration = explained<2>(seen, all, believed.usual_aberration, believed.told_of_scatter, by_aberration_px);
   const auto response = explained<1>(seen, all, believed.usual_exponent, believed.told_of_response_scatter,
                                      [](const SeenBoundary& boundary, int) { return boundary.by_exponent_px; });
-  if (response.scatter < aberration.scatter && is_response(seen, response)) return by_exponent(seen, response);
+  if (response.scatter < std::min(aberration.scatter, believed.most_response_scatter) &&
+      response.gain > believed.least_response_gain && std::abs(response.found[0]) > believed.least_exponent &&
+      is_at_more_than_one(seen, response.found[0]))
+    return by_exponent(seen, response);
   if (aberration.gain > believed.least_gain) return by_aberration(seen, aberration);
-  if (aberration.gain > believed.least_doubted_gain && aberration.scatter < believed.most_doubted_scatter)
-    return doubted_aberration(seen, aberration);
-  return std::nullopt;
+  if (!(aberration.gain > believed.least_doubted_gain && aberration.scatter < believed.most_doubted_scatter))
+    return std::nullopt;
+  // It may be specular light or shading as well.
+  aberration.sigma = aberration.sigma.cwiseMax(aberration.found.cwiseAbs());
+  aberration.found.setZero();
+  return by_aberration(seen, aberration);
 }
 
 std::array<double, 4> moved_by_exponent_px(const LightImage& light, std::span<const Measurement> measurements,
                                            double blur_px) {
-  const PooledEdges edges = pool_edges(light, measurements, in_light);
-  SeenBoundaries seen = seen_in(light.channels(), edges, blur_px, std::identity());
-  differ_by_exponent(blur_px, seen);
+  const PooledEdges edges = pool_edges(light, measurements, Look::light);
   std::array<double, 4> moved_px{};
-  for (const SeenBoundary& boundary : seen)
-    moved_px[boundary.edge->boundary] = (boundary.share * boundary.by_exponent_px).sum();
+  for (const SeenBoundary& seen : seen_in(light.channels(), edges, blur_px, std::identity()))
+    moved_px[seen.boundary] = (seen.share * seen.by_exponent_px).sum();
   return moved_px;
 }
 

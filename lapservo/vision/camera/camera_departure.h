@@ -78,11 +78,10 @@ class DepartedLight {
 };
 
 /// Effects beyond what `light` undoes already: of lateral chromatic aberration and a response that is not the rig's,
-/// the one that explains where the three channels show the boundaries; nullopt where nothing needs explaining. `glance`
-/// is what glance_at() makes of `light` and `measurements`, `blur_px` what fit_step was given. For processed images
-/// (picture_processing.h) it is arbitrary.
+/// the one that explains where the three channels show the boundaries; nullopt where nothing needs explaining.
+/// `blur_px` is what fit_step was given. For processed images (picture_processing.h) it is arbitrary.
 std::optional<CameraDeparture> find_departure(const LightImage& light, std::span<const Measurement> measurements,
-                                              const PooledEdges& glance, double blur_px);
+                                              double blur_px);
 
 /// By how much each boundary is seen farther along its normal, by an exponent of light that is larger by 1 [px]; 0
 /// where it is not seen. `blur_px`: what fit_step was given.

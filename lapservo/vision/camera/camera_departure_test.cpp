@@ -29,7 +29,7 @@ cv::Mat seen_through(const CameraEffects& camera, const Shot& shot) {
 
 FineFit fit_to(const Shot& shot, const cv::Mat& bgr, const Expected& expected = {}) {
   const Sight sight(shot.rig, bgr);
-  return fit_finely(sight.scene(), sight.light(), shot.truth(true), {}, expected);
+  return fit_finely(sight.scene(), sight.light(), shot.truth(true), expected);
 }
 
 double psi_error_rad(const Shot& shot, const FineFit& fit) {

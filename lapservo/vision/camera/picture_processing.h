@@ -71,11 +71,8 @@ struct ProcessingEvidence {
   bool explained = false;               ///< it took more than a first guess
 };
 
-/// The input of a first guess.
-PooledEdges glance_at(const LightImage& light, std::span<const Measurement> measurements);
-
-/// For the boundaries among `measurements`, which fit_step located with `blur_px`. `glance`: that at them.
-ProcessingEvidence find_processing(const LightImage& light, std::span<const Measurement> measurements,
-                                   const PooledEdges& glance, double blur_px, const ExpectedPicture& expected = {});
+/// For the boundaries among `measurements`, which fit_step located with `blur_px`.
+ProcessingEvidence find_processing(const LightImage& light, std::span<const Measurement> measurements, double blur_px,
+                                   const ExpectedPicture& expected = {});
 
 }  // namespace lapservo::internal

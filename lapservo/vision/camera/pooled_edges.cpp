@@ -12,7 +12,7 @@ namespace {
 struct EdgePlace {
   std::array<std::array<float, PooledEdge::samples>, 3> value;
   float brightness = 0;
-  std::size_t measurement = 0;
+  const Measurement* measurement = nullptr;
 
   EdgePlace() {}  // NOLINT(modernize-use-equals-default): the values are left as they are
 };
@@ -54,85 +54,60 @@ void sample_linear(const ImageView& image, float u, float v, std::size_t sample,
                               w10 * static_cast<float>(bottom[c]) + w11 * static_cast<float>(bottom[c + 3]));
 }
 
-template <std::size_t First, std::size_t Last>
-void sample_at(const ImageView& image, float u, float v, Between between, std::size_t sample, EdgePlace& place) {
-  between == Between::values_cubic ? sample_cubic<First, Last>(image, u, v, sample, place)
-                                   : sample_linear<First, Last>(image, u, v, sample, place);
-}
-
-void sample_at(const LightImage& light, const Eigen::Vector2f& at, Between between, std::size_t sample,
-               EdgePlace& place) {
-  if (between == Between::light) {
+void sample_at(const LightImage& light, const Eigen::Vector2f& at, Look look, std::size_t sample, EdgePlace& place) {
+  if (look == Look::light) {
     const LightImage::Sample seen = light.at(at.x(), at.y());
     for (std::size_t c = 0; c < 3; ++c) place.value[c][sample] = 255 * seen.light[c];
     return;
   }
-  const ImageView& image = light.image();
-  const ChannelGeometry& geometry = light.channels();
-  if (!geometry.differs()) return sample_at<0, 3>(image, at.x(), at.y(), between, sample, place);
-  const Eigen::Vector2f centre(geometry.centre_u, geometry.centre_v);
-  const Eigen::Vector2f blue = centre + geometry.magnification[0] * (at - centre);
-  const Eigen::Vector2f red = centre + geometry.magnification[2] * (at - centre);
-  sample_at<0, 1>(image, blue.x(), blue.y(), between, sample, place);
-  sample_at<1, 2>(image, at.x(), at.y(), between, sample, place);
-  sample_at<2, 3>(image, red.x(), red.y(), between, sample, place);
-}
-
-using Located = InplaceVector<std::uint16_t, EdgeMeasurements::max_lines>;
-
-std::array<Located, 4> located_on(std::span<const Measurement> measurements) {
-  std::array<Located, 4> located;
-  for (std::size_t i = 0; i < measurements.size(); ++i)
-    if (measurements[i].group < 4) located[measurements[i].group].push_back(static_cast<std::uint16_t>(i));
-  return located;
-}
-
-// Beyond this from most of a boundary's places something else was located.
-constexpr double farthest_px = 1;
-
-double median_residual_px(const Located& located, std::span<const Measurement> measurements) {
-  InplaceVector<double, EdgeMeasurements::max_lines> residuals_px;
-  for (const std::size_t i : located) residuals_px.push_back(measurements[i].residual_px);
-  return residuals_px.empty() ? 0 : median(residuals_px);
+  light.channels().for_each_place(at.x(), at.y(), [&]<std::size_t First, std::size_t Last>(float u, float v) {
+    look == Look::closely ? sample_cubic<First, Last>(light.image(), u, v, sample, place)
+                          : sample_linear<First, Last>(light.image(), u, v, sample, place);
+  });
 }
 
 // Places of a boundary, spread evenly over all that were located.
-EdgePlaces places_of(const Located& located, const LightImage& light, std::span<const Measurement> measurements,
-                     const Look& look) {
+EdgePlaces places_of(std::size_t boundary, const LightImage& light, std::span<const Measurement> measurements,
+                     Look look) {
+  constexpr double farthest_px = 1;  // from most of the places: beyond, something else was located
+  InplaceVector<const Measurement*, EdgeMeasurements::max_lines> located;
+  InplaceVector<double, EdgeMeasurements::max_lines> residuals_px;
+  for (const Measurement& m : measurements)
+    if (m.group == boundary) located.push_back(&m), residuals_px.push_back(m.residual_px);
   const int count = static_cast<int>(located.size());
-  const bool glances = look.between == Between::values && look.levels == 1;  // which is to cost little
-  const double middle_px = glances ? 0 : median_residual_px(located, measurements);
+  const int most = look == Look::glance ? 12 : look == Look::light ? 24 : EdgeMeasurements::max_lines;
+  const bool glances = look == Look::glance;  // which is to cost little
+  const double middle_px = glances || located.empty() ? 0 : median(residuals_px);
   EdgePlaces places;
   int seen = 0;
-  for (const std::size_t i : located) {
-    if (seen++ * look.places % std::max(count, look.places) >= look.places) continue;
-    const Measurement& m = measurements[i];
-    if (!glances && std::abs(m.residual_px - middle_px) > farthest_px) continue;
-    const Eigen::Vector2f reach = static_cast<float>(PooledEdge::reach) * m.normal;
-    const Eigen::Vector2f first = m.expected_px - reach, last = m.expected_px + reach;
+  for (const Measurement* m : located) {
+    if (seen++ * most % std::max(count, most) >= most) continue;
+    if (!glances && std::abs(m->residual_px - middle_px) > farthest_px) continue;
+    const Eigen::Vector2f reach = static_cast<float>(PooledEdge::reach) * m->normal;
+    const Eigen::Vector2f first = m->expected_px - reach, last = m->expected_px + reach;
     if (!light.contains(first.cast<double>()) || !light.contains(last.cast<double>())) continue;
     EdgePlace& place = places.emplace_back();
-    place.measurement = i;
+    place.measurement = m;
     for (std::size_t k = 0; k < PooledEdge::samples; ++k)
-      sample_at(light, first + static_cast<float>(k) * m.normal, look.between, k, place);
+      sample_at(light, first + static_cast<float>(k) * m->normal, look, k, place);
     for (const auto& channel : place.value)
-      if (look.levels > 1) place.brightness = std::accumulate(channel.begin(), channel.end(), place.brightness);
+      if (look == Look::closely) place.brightness = std::accumulate(channel.begin(), channel.end(), place.brightness);
   }
   return places;
 }
 
-PooledEdge mean_of(std::span<const EdgePlace* const> places, std::span<const Measurement> measurements) {
+PooledEdge mean_of(std::span<const EdgePlace> places) {
   PooledEdge edge;
   edge.places = static_cast<int>(places.size());
   const float part = 1 / static_cast<float>(255 * edge.places);
-  for (const EdgePlace* place : places) {
-    const Measurement& m = measurements[place->measurement];
+  for (const EdgePlace& place : places) {
+    const Measurement& m = *place.measurement;
     edge.boundary = m.group;
     edge.residual_px += m.residual_px / edge.places;
     edge.place_px += m.expected_px, edge.normal += m.normal;
     edge.clear_px = std::clamp(static_cast<int>(m.clear_px), 0, edge.clear_px);
     for (std::size_t c = 0; c < 3; ++c)
-      for (std::size_t i = 0; i < PooledEdge::samples; ++i) edge.value[c][i] += part * place->value[c][i];
+      for (std::size_t i = 0; i < PooledEdge::samples; ++i) edge.value[c][i] += part * place.value[c][i];
   }
   edge.place_px /= static_cast<float>(edge.places), edge.normal /= static_cast<float>(edge.places);
   return edge;
@@ -154,24 +129,22 @@ void undo_cubic(PooledEdge& edge) {
 
 }  // namespace
 
-PooledEdges pool_edges(const LightImage& light, std::span<const Measurement> measurements, const Look& look) {
+PooledEdges pool_edges(const LightImage& light, std::span<const Measurement> measurements, Look look) {
+  const std::size_t most_levels = look == Look::closely ? max_brightness_levels : 1;
   PooledEdges edges;
-  for (const Located& located : located_on(measurements)) {
-    const EdgePlaces places = places_of(located, light, measurements, look);
-    InplaceVector<const EdgePlace*, EdgeMeasurements::max_lines> darkest_first;
-    for (const EdgePlace& place : places) darkest_first.push_back(&place);
-    const std::size_t count = std::clamp<std::size_t>(places.size() / std::size_t{PooledEdge::min_places}, 1,
-                                                      static_cast<std::size_t>(look.levels));
-    if (count > 1)
-      std::sort(darkest_first.begin(), darkest_first.end(),
-                [](const EdgePlace* a, const EdgePlace* b) { return a->brightness < b->brightness; });
+  for (std::size_t boundary = 0; boundary < 4; ++boundary) {
+    EdgePlaces places = places_of(boundary, light, measurements, look);
+    const std::size_t count =
+        std::clamp<std::size_t>(places.size() / std::size_t{PooledEdge::min_places}, 1, most_levels);
+    if (count > 1) std::ranges::sort(places, {}, &EdgePlace::brightness);
     for (std::size_t level = 0; level < count && !places.empty(); ++level) {
       const std::size_t first = level * places.size() / count, last = (level + 1) * places.size() / count;
-      const std::span<const EdgePlace* const> alike(darkest_first.begin() + first, last - first);
-      for (const EdgePlace* place : alike)
-        edges.of_measurement[place->measurement] = static_cast<std::uint8_t>(edges.all.size());
-      PooledEdge edge = mean_of(alike, measurements);
-      if (look.between == Between::values_cubic) undo_cubic(edge);
+      const std::span<const EdgePlace> alike(places.begin() + first, last - first);
+      PooledEdge edge = mean_of(alike);
+      if (look == Look::closely) undo_cubic(edge);
+      for (std::size_t i = 0; i < alike.size() && edge.is_seen(); ++i)
+        edges.of_measurement[static_cast<std::size_t>(alike[i].measurement - measurements.data())] =
+            static_cast<std::uint8_t>(edges.all.size());
       edges.all.push_back(edge);
     }
   }

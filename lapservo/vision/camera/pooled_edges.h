@@ -11,7 +11,7 @@
 
 namespace lapservo::internal {
 
-/// A frame's values across one boundary, averaged over places where it was located: encoded values (or light: Look) in
+/// A frame's values across one boundary, averaged over places where it was located: encoded values (or Look::light) in
 /// [0, 1] along the boundary's normal, a pixel apart, sample `reach` where the pose has the boundary.
 struct PooledEdge {
   static constexpr int reach = 6, samples = 2 * reach + 1;
@@ -32,26 +32,20 @@ struct PooledEdge {
 inline constexpr int max_brightness_levels = 4;
 struct PooledEdges {
   InplaceVector<PooledEdge, 4 * max_brightness_levels> all;
-  /// For each measurement, at which of `all` it was averaged.
+  /// For each measurement, at which of `all` it was averaged; nowhere where that is not seen.
   static constexpr std::uint8_t nowhere = 255;
   std::array<std::uint8_t, EdgeMeasurements::most> of_measurement;
 
   PooledEdges() { of_measurement.fill(nowhere); }
 };
 
-/// The values that are taken between pixels, and averaged: encoded values, along straight lines or cubic (the former
-/// darken what is bright beside an edge, where encoded light bends, for an eighth of the time); or light along straight
-/// lines, as fit_step does, which averages without a bias but is no value that a camera's filters worked on.
-enum class Between { values, values_cubic, light };
-
-/// How closely boundaries are looked at: at most so many places of each, in at most so many levels of brightness.
-struct Look {
-  int places;
-  int levels;
-  Between between;
-};
+/// What is taken between pixels, and averaged: at a glance some places' encoded values along straight lines, which
+/// darken what is bright beside an edge, where encoded light bends, for an eighth of the time; closely, those of all
+/// places, by brightness and cubic; or light along straight lines, as fit_step does, which averages without a bias but
+/// is no value that a camera's filters worked on.
+enum class Look { glance, closely, light };
 
 /// For the boundaries among `measurements`.
-PooledEdges pool_edges(const LightImage& light, std::span<const Measurement> measurements, const Look& look);
+PooledEdges pool_edges(const LightImage& light, std::span<const Measurement> measurements, Look look);
 
 }  // namespace lapservo::internal

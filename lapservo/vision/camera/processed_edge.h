@@ -24,14 +24,8 @@ struct PictureProcessing {
 };
 
 /// The same as unknowns of a fit.
-enum class ProcessingUnknown {
-  log_blur,
-  chroma_variance,
-  saturation,
-  sharpening,
-  log_radius,
-  log_mosaic,
-  chroma_shift_px
+struct ProcessingUnknown {
+  enum Index { log_blur, chroma_variance, saturation, sharpening, log_radius, log_mosaic, chroma_shift_px };
 };
 inline constexpr int processing_unknowns = 7;
 using ProcessingVector = Eigen::Matrix<double, processing_unknowns, 1>;
@@ -42,9 +36,6 @@ PictureProcessing processing_of(const ProcessingVector& unknowns);
 using EdgeVector = Eigen::Matrix<double, 8, 1>;
 inline constexpr int edge_unknowns = EdgeVector::RowsAtCompileTime;
 inline constexpr int edge_offset = 0, edge_before = 1, edge_after = 4, edge_gradient = 7;
-/// For encoded b, g, r as they are before `processing`.
-EdgeVector edge_of(const PictureProcessing& processing, const Eigen::Vector3d& before, const Eigen::Vector3d& after,
-                   double offset_px);
 
 /// Samples of a channel, a pixel apart, then those of the next; rows beyond the samples fill a register.
 inline constexpr int edge_rows = 16, all_edge_rows = 3 * edge_rows;
@@ -53,11 +44,12 @@ using EdgeSamples = Eigen::Matrix<float, all_edge_rows, 1>;
 // Filters of encoded values, symmetric: the taps from the middle on, a pixel apart. One of an unsharp mask or of
 // chroma's blur reaches 4 px, both together 8.
 inline constexpr int filter_reach = 4, both_filters_reach = 2 * filter_reach;
-using Filter = std::array<double, filter_reach + 1>;
-using BothFilters = std::array<double, both_filters_reach + 1>;
+using Filter = Eigen::Array<double, filter_reach + 1, 1>;
+using BothFilters = Eigen::Array<double, both_filters_reach + 1, 1>;
 
 /// The effect of the processing on encoded luma and on colour differences, and with `derivatives` how that changes.
 struct ProcessingFilters {
+  PictureProcessing processing;
   Filter luma, luma_by_sharpening, luma_by_radius;
   BothFilters chroma, chroma_by_sharpening, chroma_by_radius, chroma_by_variance;
 
@@ -65,32 +57,20 @@ struct ProcessingFilters {
 };
 
 /// A camera's image of a step of light.
-class ProcessedEdge {
- public:
-  explicit ProcessedEdge(const LightTable& light_of_value) : light_of_value_(light_of_value) {}
+EdgeSamples processed_edge(const LightTable& light_of_value, const ProcessingFilters& filters, const EdgeVector& edge);
 
-  EdgeSamples values(const ProcessingFilters& filters, const PictureProcessing& processing,
-                     const EdgeVector& edge) const;
-
-  struct Linearised {
-    EdgeSamples values;
-    Eigen::Matrix<float, all_edge_rows, processing_unknowns + edge_unknowns> jacobian;
-  };
-  Linearised linearised(const ProcessingFilters& filters, const PictureProcessing& processing,
-                        const EdgeVector& edge) const;
-
- private:
-  const LightTable& light_of_value_;
+/// And its derivatives by the processing and by the edge; `filters` have theirs.
+struct LinearisedEdge {
+  EdgeSamples values;
+  Eigen::Matrix<float, all_edge_rows, processing_unknowns + edge_unknowns> jacobian;
 };
+LinearisedEdge linearised_edge(const LightTable& light_of_value, const ProcessingFilters& filters,
+                               const EdgeVector& edge);
 
 /// Light along a line, a pixel apart, as it looks after blurred colour differences in their place and sharpening. Light
-/// that does not vary stays as it is, so light is as the camera shows it: `saturation` has been at work. `luma` is the
-/// same without colour differences: what a grey image of it shows, in all channels alike.
-struct FilteredLight {
-  std::vector<std::array<double, 3>> light;
-  std::vector<double> luma;
-};
-FilteredLight filtered_light(const LightTable& light_of_value, const PictureProcessing& processing,
-                             std::span<const std::array<double, 3>> light);
+/// that does not vary stays as it is, so light is as the camera shows it: `saturation` has been at work. With
+/// `as_grey`, without colour differences: what a grey image of it shows, in all channels alike.
+std::vector<std::array<double, 3>> filtered_light(const LightTable& light_of_value, const PictureProcessing& processing,
+                                                  std::span<const std::array<double, 3>> light, bool as_grey);
 
 }  // namespace lapservo::internal

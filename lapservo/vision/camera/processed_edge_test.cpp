@@ -5,27 +5,24 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/geometry/response.h"
+#include "lapservo/vision/camera/test_edges.h"
 
-namespace lapservo::internal {
-namespace processed_edge_test {
-namespace {
+namespace lapservo::internal::processed_edge_test {
 
 const Eigen::Vector3d green(0.25, 0.75, 0.5), pink(0.8, 0.3, 0.6), grey(0.15, 0.16, 0.15);
 
 ProcessingVector everything() {
   ProcessingVector unknowns;
-  using enum ProcessingUnknown;
-  unknowns[static_cast<int>(log_blur)] = std::log(1.1), unknowns[static_cast<int>(chroma_variance)] = 0.8;
-  unknowns[static_cast<int>(saturation)] = 1.3, unknowns[static_cast<int>(sharpening)] = 0.5;
-  unknowns[static_cast<int>(log_radius)] = std::log(1.3), unknowns[static_cast<int>(log_mosaic)] = 0.1;
-  unknowns[static_cast<int>(chroma_shift_px)] = 0.4;
+  using enum ProcessingUnknown::Index;
+  unknowns[log_blur] = std::log(1.1), unknowns[chroma_variance] = 0.8;
+  unknowns[saturation] = 1.3, unknowns[sharpening] = 0.5;
+  unknowns[log_radius] = std::log(1.3), unknowns[log_mosaic] = 0.1;
+  unknowns[chroma_shift_px] = 0.4;
   return unknowns;
 }
 
 EdgeSamples shown(const ProcessingVector& unknowns, const EdgeVector& edge) {
-  const auto table = Response{}.table();
-  const PictureProcessing processing = processing_of(unknowns);
-  return ProcessedEdge(table).values(ProcessingFilters(processing, false), processing, edge);
+  return processed_edge(Response{}.table(), ProcessingFilters(processing_of(unknowns), false), edge);
 }
 
 // Also where some of it is clipped: red is at black on one side.
@@ -34,8 +31,7 @@ TEST(ProcessedEdge, DerivativesAreThoseOfTheValues) {
   const PictureProcessing processing = processing_of(unknowns);
   EdgeVector edge = edge_of(processing, green, Eigen::Vector3d(0.7, 0.6, 0.14), 0.13);
   edge[edge_gradient] = 0.01;
-  const auto table = Response{}.table();
-  const auto model = ProcessedEdge(table).linearised(ProcessingFilters(processing, true), processing, edge);
+  const LinearisedEdge model = linearised_edge(Response{}.table(), ProcessingFilters(processing, true), edge);
   EXPECT_LT((model.values - shown(unknowns, edge)).cwiseAbs().maxCoeff(), 1e-5F);
   constexpr double step = 4e-3;
   for (int i = 0; i < processing_unknowns + edge_unknowns; ++i) {
@@ -59,7 +55,7 @@ TEST(ProcessedEdge, PlateausAreAsShown) {
   EdgeVector edge;
   edge << 0, pink, grey, 0;
   for (const double saturation : {0.8, 1.0, 1.6}) {
-    unknowns[static_cast<int>(ProcessingUnknown::saturation)] = saturation;
+    unknowns[ProcessingUnknown::saturation] = saturation;
     const EdgeSamples values = shown(unknowns, edge);
     for (int c = 0; c < 3; ++c) {
       EXPECT_NEAR(values[edge_rows * c], pink[c], 3e-3);
@@ -70,7 +66,7 @@ TEST(ProcessedEdge, PlateausAreAsShown) {
 
 TEST(ProcessedEdge, ShowsNothingBelowBlackOrAboveWhite) {
   ProcessingVector unknowns = everything();
-  unknowns[static_cast<int>(ProcessingUnknown::saturation)] = 2;
+  unknowns[ProcessingUnknown::saturation] = 2;
   const EdgeVector edge = edge_of(processing_of(unknowns), Eigen::Vector3d(0.02, 0.95, 0.9), pink, 0);
   EXPECT_LT(edge.minCoeff(), -0.3);
   EXPECT_GT(edge.maxCoeff(), 1);
@@ -79,6 +75,4 @@ TEST(ProcessedEdge, ShowsNothingBelowBlackOrAboveWhite) {
   EXPECT_LE(values.maxCoeff(), 1);
 }
 
-}  // namespace
-}  // namespace processed_edge_test
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::processed_edge_test

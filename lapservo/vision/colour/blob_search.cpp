@@ -1,13 +1,14 @@
 #include "lapservo/vision/colour/blob_search.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <cstring>
 #include <functional>
 #include <iterator>
 #include <span>
 #include <utility>
+
+#include <Eigen/Geometry>
 
 namespace lapservo::internal {
 
@@ -19,15 +20,21 @@ class Grid {
   static constexpr int reach = 2;  // cells: bridges a highlight along the shaft and blotches of blood
   static constexpr int around = 2 * reach + 1;
 
-  Grid(const ImageView& image, const ColourClasses& classes, int grid_px)
-      : grid_px_(grid_px), columns_(image.width_px / grid_px), rows_(image.height_px / grid_px) {
-    cells_.resize(static_cast<std::size_t>(stride()) * static_cast<std::size_t>(rows_ + 2 * reach));
-    for (int row = 0; row < rows_; ++row) {
+  Grid(const ImageView& image, const ColourClasses& classes) : columns_(image.width_px / blob_grid_px) {
+    const int rows = image.height_px / blob_grid_px;
+    cells_.resize(static_cast<std::size_t>(stride()) * static_cast<std::size_t>(rows + 2 * reach));
+    for (int row = 0; row < rows; ++row) {
       const int first = (row + reach) * stride() + reach;
       const std::span<std::uint8_t> line(&at(first), static_cast<std::size_t>(columns_));
-      classes.classify(image.pixel(grid_px / 2, grid_px / 2 + row * grid_px), 3 * static_cast<std::ptrdiff_t>(grid_px),
-                       line);
-      add_coloured(line, first);
+      classes.classify(image.pixel(middle_of(0), middle_of(row)), 3 * blob_grid_px, line);
+      constexpr std::size_t at_once = 8;  // few have a colour
+      for (std::size_t i = 0; i < line.size(); i += at_once) {
+        const std::size_t count = std::min(at_once, line.size() - i);
+        std::uint64_t any = 0;
+        std::memcpy(&any, &line[i], count);
+        for (std::size_t j = i; any && j < i + count; ++j)
+          if (line[j]) coloured_.push_back(first + static_cast<int>(j));
+      }
     }
   }
 
@@ -38,24 +45,13 @@ class Grid {
   std::uint8_t* row_around(int cell, int rows) { return &at(cell + rows * stride() - reach); }
   int cell_of(const std::uint8_t* place) const { return static_cast<int>(place - cells_.data()); }
   Blob::Sample sample(int cell) {
-    const int column = cell % stride() - reach, row = cell / stride() - reach;
-    return {grid_px_ / 2 + column * grid_px_, grid_px_ / 2 + row * grid_px_, at(cell)};
+    return {middle_of(cell % stride() - reach), middle_of(cell / stride() - reach), at(cell)};
   }
 
  private:
-  void add_coloured(std::span<const std::uint8_t> line, int first) {
-    constexpr std::size_t at_once = 8;  // few have a colour
-    for (std::size_t i = 0; i < line.size(); i += at_once) {
-      const std::size_t count = std::min(at_once, line.size() - i);
-      std::uint64_t any = 0;
-      std::memcpy(&any, &line[i], count);
-      for (std::size_t j = i; any && j < i + count; ++j)
-        if (line[j]) coloured_.push_back(first + static_cast<int>(j));
-    }
-  }
-
+  static int middle_of(int cell) { return blob_grid_px / 2 + cell * blob_grid_px; }
   int stride() const { return columns_ + 2 * reach; }
-  int grid_px_, columns_, rows_;
+  int columns_;
   std::vector<std::uint8_t> cells_;
   std::vector<int> coloured_;
 };
@@ -99,22 +95,15 @@ Blob take_blob(Grid& grid, int seed, std::vector<int>& stack) {
   return blob;
 }
 
-struct Box {
-  int left, right, top, bottom;
-  double diagonal_px() const { return std::hypot(right - left, bottom - top); }
-};
-
-Box box_about(const Blob& blob) {
-  const auto [left, right] = std::ranges::minmax(blob.samples, {}, &Blob::Sample::u);
-  const auto [top, bottom] = std::ranges::minmax(blob.samples, {}, &Blob::Sample::v);
-  return {left.u, right.u, top.v, bottom.v};
+Eigen::AlignedBox2d box_about(const Blob& blob) {
+  Eigen::AlignedBox2d box;
+  for (const Blob::Sample& sample : blob.samples) box.extend(Eigen::Vector2d(sample.u, sample.v));
+  return box;
 }
 
-bool lie_near(const Box& a, const Box& b) {
+bool lie_near(const Eigen::AlignedBox2d& a, const Eigen::AlignedBox2d& b) {
   constexpr double of_length = 0.5;
-  const int aside = std::max({0, b.left - a.right, a.left - b.right});
-  const int above = std::max({0, b.top - a.bottom, a.top - b.bottom});
-  return std::hypot(aside, above) < of_length * std::max(a.diagonal_px(), b.diagonal_px());
+  return a.exteriorDistance(b) < of_length * std::max(a.diagonal().norm(), b.diagonal().norm());
 }
 
 // A marker does, unless all but one of its bands are hidden.
@@ -126,32 +115,25 @@ bool shows_two_colours(const Blob& blob) {
 
 }  // namespace
 
-std::vector<Blob> find_blobs(const ImageView& image, const ColourClasses& classes, int grid_px, int min_samples) {
-  Grid grid(image, classes, grid_px);
+std::vector<Blob> largest_blobs(const ImageView& image, const ColourClasses& classes) {
+  constexpr std::size_t max_blobs = 6;  // bounds the time that tissue with the marker's colours costs
+  Grid grid(image, classes);
   drop_lonely(grid);
   std::vector<Blob> blobs;
   std::vector<int> stack;
   for (const int seed : grid.coloured()) {
     if (!grid.at(seed)) continue;
     Blob blob = take_blob(grid, seed, stack);
-    blob.grid_px = grid_px;
-    if (static_cast<int>(blob.samples.size()) >= min_samples) blobs.push_back(std::move(blob));
+    if (std::ssize(blob.samples) >= min_blob_samples) blobs.push_back(std::move(blob));
   }
   std::ranges::sort(blobs, std::greater{}, [](const Blob& blob) { return blob.samples.size(); });
-  return blobs;
-}
-
-std::vector<Blob> largest_blobs(const ImageView& image, const ColourClasses& classes) {
-  constexpr int grid_px = 8;
-  constexpr std::size_t max_blobs = 6;  // bounds the time that tissue with the marker's colours costs
-  auto blobs = find_blobs(image, classes, grid_px, min_blob_samples);
   std::stable_partition(blobs.begin(), blobs.end(), shows_two_colours);
   if (blobs.size() > max_blobs) blobs.resize(max_blobs);
   return blobs;
 }
 
 std::vector<Blob> joined_blobs(const std::vector<Blob>& blobs) {
-  std::vector<Box> boxes;
+  std::vector<Eigen::AlignedBox2d> boxes;
   std::vector<std::size_t> group_of;
   for (const Blob& blob : blobs) group_of.push_back(group_of.size()), boxes.push_back(box_about(blob));
   for (std::size_t i = 0; i < blobs.size(); ++i)
@@ -160,7 +142,7 @@ std::vector<Blob> joined_blobs(const std::vector<Blob>& blobs) {
         std::replace(group_of.begin(), group_of.end(), group_of[i], group_of[j]);
   std::vector<Blob> joined;
   for (std::size_t group = 0; group < blobs.size(); ++group) {
-    Blob together{{}, blobs[group].grid_px};
+    Blob together;
     for (std::size_t i = 0; i < blobs.size(); ++i)
       if (group_of[i] == group)
         together.samples.insert(together.samples.end(), blobs[i].samples.begin(), blobs[i].samples.end());

@@ -8,6 +8,9 @@
 
 namespace lapservo::internal {
 
+/// Distance of neighbouring samples, and a blob's size: smaller ones leave too few boundaries for a fit.
+inline constexpr int blob_grid_px = 8, min_blob_samples = 8;
+
 /// Pixels of the markers' colours that lie together, sampled on a sparse grid.
 struct Blob {
   struct Sample {
@@ -15,16 +18,10 @@ struct Blob {
     std::uint8_t colour;
   };
   std::vector<Sample> samples;
-  int grid_px = 0;  ///< distance of neighbouring samples
 };
 
-/// A blob's size on a grid of 8 px: smaller ones leave too few boundaries for a fit.
-inline constexpr int min_blob_samples = 8;
-
-/// All groups of coloured samples of at least `min_samples`, largest first. Touches one pixel in grid_px^2 only.
-std::vector<Blob> find_blobs(const ImageView& image, const ColourClasses& classes, int grid_px, int min_samples);
-
-/// As many of them as detection looks at, on its grid: first those of two colours and more, largest first.
+/// As many as detection looks at: first those of two colours and more, largest first. Touches one pixel in
+/// blob_grid_px^2 only.
 std::vector<Blob> largest_blobs(const ImageView& image, const ColourClasses& classes);
 
 /// The same, but as one those that blood may have parted: nearer to one another than half of what the larger one

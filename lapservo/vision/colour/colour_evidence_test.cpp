@@ -13,11 +13,6 @@ TEST(ColourEvidence, FrequenciesOfAPlaceAddUpToOne) {
   for (const auto& shown : colour_frequencies) EXPECT_NEAR(std::accumulate(shown.begin(), shown.end(), 0.0), 1, 2e-3);
 }
 
-TEST(ColourEvidence, CountsPixelsOfABandsOwnColour) {
-  EXPECT_DOUBLE_EQ(colour_evidence.of(Place::band, Shows::its_band), 1);
-  EXPECT_DOUBLE_EQ(section_gain(true), 1);
-}
-
 // Each colour speaks for the place where it is usual, and against another one.
 TEST(ColourEvidence, SpeaksForThePlaceOfEachColour) {
   constexpr std::array usual{Shows::its_band, Shows::grey, Shows::other};

@@ -1,11 +1,10 @@
-#include "lapservo/vision/decision/displaced_boundary.h"
-
 #include <cstddef>
 #include <string>
 
 #include <gtest/gtest.h>
 
 #include "lapservo/testing/shots.h"
+#include "lapservo/vision/decision/verification.h"
 
 namespace lapservo::internal {
 namespace {

@@ -60,12 +60,18 @@ std::optional<Observation::Rcm> rcm_of(const FineFit& fit, const RcmPrior* regis
   const auto known =
       fit.unknowns.through_rcm() ? std::optional(*registration) : doubted(*registration, fit.unknowns.pose());
   if (!known) return std::nullopt;
-  const auto estimate = configuration_estimate(fit.unknowns, fit.covariance, *known, fit.with_registration);
-  if (!estimate) return std::nullopt;
-  Observation::Rcm rcm{estimate->q, estimate->covariance};
-  rcm.covariance(3, 3) += sigma_seam_rad * sigma_seam_rad;
-  rcm.q.theta_rad = wrap_pi(rcm.q.theta_rad), rcm.q.psi_rad = wrap_pi(rcm.q.psi_rad);
+  auto rcm = configuration_estimate(fit.unknowns, fit.covariance, *known, fit.with_registration);
+  if (!rcm) return std::nullopt;
+  rcm->covariance(3, 3) += sigma_seam_rad * sigma_seam_rad;
+  rcm->q.theta_rad = wrap_pi(rcm->q.theta_rad), rcm->q.psi_rad = wrap_pi(rcm->q.psi_rad);
   return rcm;
+}
+
+// The same pose in the unrolled frame of another turn about the axis, in which psi is this.
+ShaftPose in_azimuths_of(const ShaftPose& pose, double psi_rad) {
+  const Rigid3& from = pose.camera_from_unrolled;
+  const Eigen::AngleAxisd turn(pose.psi_rad - psi_rad, Eigen::Vector3d::UnitZ());
+  return {{(from.rotation * turn).normalized(), from.translation}, psi_rad};
 }
 
 }  // namespace
@@ -104,10 +110,8 @@ Observation::MarkerPose marker_pose_of(const Marker& marker, const PoseUnknowns&
 Observation observation_of(const Scene& scene, const FineFit& fit) {
   const ShaftPose& pose = fit.unknowns.pose();
   const auto line = centre_line(scene.camera, scene.marker, pose.camera_from_unrolled, pose.psi_rad);
-  Observation observation;
-  observation.status = Status::poor_fit;
-  if (!line) return observation;
-  observation = observed_line(*line, scene, fit);
+  if (!line) return refused_observation(Status::poor_fit);
+  Observation observation = observed_line(*line, scene, fit);
   observation.status = Status::ok;
   const RcmPrior* registration = scene.registration;
   observation.features = features_of(
@@ -121,12 +125,10 @@ Observation observation_of(const Scene& scene, const FineFit& fit) {
   return observation;
 }
 
-Observation refused_observation(Status why, const ShaftPose& pose) {
+Observation refused_observation(Status why, const std::optional<ShaftPose>& pose) {
   Observation observation;
   observation.status = why;
-  observation.refused.what = Observation::Refused::What::pose;
-  observation.refused.camera_from_unrolled = pose.camera_from_unrolled;
-  observation.refused.psi_rad = pose.psi_rad;
+  if (pose) observation.refused = {Observation::Refused::What::pose, pose->camera_from_unrolled, pose->psi_rad};
   return observation;
 }
 

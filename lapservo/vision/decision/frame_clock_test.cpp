@@ -1,11 +1,11 @@
-#include "lapservo/vision/decision/frame_clock.h"
-
 #include <cmath>
 #include <limits>
 #include <optional>
 #include <vector>
 
 #include <gtest/gtest.h>
+
+#include "lapservo/vision/decision/instrument_memory.h"
 
 namespace lapservo::internal {
 namespace {

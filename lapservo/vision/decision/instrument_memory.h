@@ -2,15 +2,36 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <cstdint>
 #include <optional>
 
-#include "lapservo/vision/camera/camera_departure.h"
 #include "lapservo/vision/camera/picture_processing.h"
-#include "lapservo/vision/edges/edge_blur.h"
 #include "lapservo/vision/model/fine_fit.h"
+#include "lapservo/vision/shaft/scene.h"
 #include "lapservo/vision/shaft/shaft_pose.h"
 
 namespace lapservo::internal {
+
+/// When frames were taken, by a clock that always goes on.
+class FrameClock {
+ public:
+  /// A power of two, so that equal steps are equal in doubles.
+  static constexpr double usual_period_s = 1.0 / 32;
+
+  /// The next frame's time. Goes on by usual_period_s where its time is not known, or does not go on from the time
+  /// before.
+  double next(std::optional<double> time_s) {
+    const double since_s = time_s && last_s_ ? *time_s - *last_s_ : 0;
+    now_s_ += since_s > 0 && std::isfinite(since_s) ? since_s : usual_period_s;
+    last_s_ = time_s;
+    return now_s_;
+  }
+
+ private:
+  double now_s_ = 0;
+  std::optional<double> last_s_;
+};
 
 /// In which of a followed marker's frames to look at what the camera did to the image (picture_processing.h). A camera
 /// that processes its images is looked at in each frame, since what to take off depends on the frame. One that does not
@@ -37,14 +58,11 @@ class LookSchedule {
 /// The memory of an instrument that was found in the frame before. Times are FrameClock's.
 struct InstrumentMemory {
   double time_s;
-  PoseUnknowns last;
-  PoseVector step;    ///< of the unknowns, from the frame before
-  double step_s = 0;  ///< which took so long; 0 where none was found before
-  EdgeBlur blur;
+  FineFit fit;
   LookSchedule looks;
-  std::array<double, 4> bias_px{};
-  CameraDeparture departure;
-  bool among_others = false;  ///< Found::among_others
+  bool among_others = false;             ///< Found::among_others
+  PoseVector step = PoseVector::Zero();  ///< of the unknowns, from the frame before
+  double step_s = 0;                     ///< which took so long; 0 where none was found before
 
   Expected expected(double at_s) const;
   /// Where it is when it moves on as it did, for some steps at most.
@@ -54,5 +72,41 @@ struct InstrumentMemory {
 /// After a frame in which it was found.
 InstrumentMemory remembered(const std::optional<InstrumentMemory>& before, const FineFit& fit, bool among_others,
                             double time_s);
+
+/// The evidence of a run's frames about a print.
+struct PrintRecordLimits {
+  double wholly_located = 0.8, most_p_false = 1e-4;  ///< the rig's: all boundaries on such a part, psi so rarely wrong
+  /// From one side that is so near, and two that show much of the same (a camera sees 1 rad to either side).
+  double near_rad = 0.6, in_view_rad = 1.2;
+  double exchange_s = 2;                        ///< of which nothing was added for so long may be another instrument's
+  int least_off_sides = 3, off_for_others = 2;  ///< and so many times those from which it may be the rig's
+};
+inline constexpr PrintRecordLimits print_record_limits;
+
+/// Whether a frame showed that the print is the rig's, as far as psi goes: wholly seen, and hardly ever wrong.
+bool shows_the_rigs_print(const FineFit& fit);
+
+/// The evidence of a run's frames about one instrument's print, from each side. A misprint looks like the rig's, but
+/// turned, from few sides; and where blood hides an inner boundary a single frame can't show it.
+class PrintRecord {
+ public:
+  /// `possible`: nothing speaks against the rig's print, but the frame could not show it.
+  enum class View : std::uint8_t { unseen, possible, the_rigs, off };
+
+  /// Before each frame; times are FrameClock's. Forgets a print of which nothing was added for so long that it may be
+  /// another one.
+  void begin_frame(double time_s);
+  /// The latest from there counts, but what is possible is no news of what was the rig's. `tau_rad`: of the generatrix
+  /// that faces the camera, any angle.
+  void add(double tau_rad, View view);
+  /// From which what shows was seen from two sides to be the rig's, and from none to be off.
+  PrintSides known_sides() const;
+  /// Whether it is off from several sides, and from far more than it may be the rig's.
+  bool is_off() const;
+
+ private:
+  std::array<View, print_sides> views_{};
+  double now_s_ = 0, seen_s_ = 0;
+};
 
 }  // namespace lapservo::internal

@@ -1,11 +1,9 @@
-#include "lapservo/vision/decision/print_record.h"
-
 #include <gtest/gtest.h>
 
 #include "lapservo/core/angles.h"
+#include "lapservo/vision/decision/instrument_memory.h"
 
-namespace lapservo::internal {
-namespace print_record_test {
+namespace lapservo::internal::print_record_test {
 
 using View = PrintRecord::View;
 
@@ -72,5 +70,4 @@ TEST(PrintRecord, APictureThatCanNotTellIsNoNews) {
   EXPECT_FALSE(is_the_rigs(record, 2.8)) << "near what could not show it, and one other";
 }
 
-}  // namespace print_record_test
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::print_record_test

@@ -51,10 +51,8 @@ std::optional<Value> change_at(const Scene& scene, const BoundaryPoint& point, i
   Value change = Value::Zero();
   for (int i = 1; i <= pixels; ++i)
     for (const int side : {-1, 1}) {
-      const Eigen::Vector2d raw_px = point.raw_px + side * i * point.along;
-      if (scene.class_at(raw_px) == Scene::outside) return std::nullopt;
-      const std::uint8_t* bgr =
-          scene.image.pixel(static_cast<int>(raw_px.x() + 0.5), static_cast<int>(raw_px.y() + 0.5));
+      const std::uint8_t* const bgr = scene.pixel_at(point.raw_px + side * i * point.along);
+      if (!bgr) return std::nullopt;
       change += static_cast<float>(side) / static_cast<float>(pixels) * Value(bgr[0], bgr[1], bgr[2]);
     }
   return change;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "lapservo/core/inplace_vector.h"
 #include "lapservo/marker/azimuths.h"
 #include "lapservo/vision/shaft/sampled_surface.h"
 
@@ -46,6 +47,38 @@ Status validate_psi(const Scene& scene, const FineFit& fit) {
   const bool is_sure = fit.psi_variance_rad2() < limit + limits.tolerance_slack * by_tolerance;
   const bool is_right = fit.p_false < scene.max_p_false + limits.tolerance_slack * fit.p_false_by_tolerance;
   return is_sure && is_right ? Status::ok : Status::uncertain;
+}
+
+using Residuals = InplaceVector<double, EdgeMeasurements::max_lines>;
+
+bool is_doubtful(const FineFit& fit, std::size_t boundary) {
+  return fit.used[boundary] < fine_fit_limits.well_seen_fraction * fit.lines;
+}
+
+// The largest number of residuals that lie about one of them.
+int most_alike(const Residuals& residuals_px) {
+  std::ptrdiff_t most = 0;
+  for (const double middle_px : residuals_px)
+    most = std::max(most, std::count_if(residuals_px.begin(), residuals_px.end(), [&](double residual_px) {
+                      return std::abs(residual_px - middle_px) < displaced_limits.alike_px;
+                    }));
+  return static_cast<int>(most);
+}
+
+// `bias_px`: by how much the camera's processing may have moved it.
+bool shows_elsewhere(const EdgeMeasurements& edges, std::size_t boundary, double bias_px, double tolerance_m) {
+  Residuals elsewhere_px;
+  int agreeing = 0;
+  for (const Measurement& m : edges.all) {
+    if (m.group != boundary) continue;
+    const double sigma_px = std::hypot(m.sigma_px, tolerance_m * m.along_px_per_m);
+    if (std::abs(m.residual_px) <
+        bias_px + std::max(displaced_limits.agreeing_px, displaced_limits.agreeing_sigmas * sigma_px))
+      ++agreeing;
+    else if (m.sigma_px < displaced_limits.max_sigma_px)
+      elsewhere_px.push_back(m.residual_px);
+  }
+  return most_alike(elsewhere_px) >= std::max(displaced_limits.min_lines, agreeing + 1);
 }
 
 }  // namespace
@@ -123,6 +156,21 @@ Status validate(const Scene& scene, const FineFit& fit) {
     return Status::poor_fit;
   if (scene.registration && !fit.unknowns.through_rcm() && !fit.is_well_seen()) return Status::uncertain;
   return validate_psi(scene, fit);
+}
+
+bool may_be_displaced(const FineFit& fit) {
+  return is_doubtful(fit, 1) || is_doubtful(fit, 2);
+}
+
+bool is_displaced(const Scene& scene, const LightImage& light, const FineFit& fit) {
+  constexpr Effort farther{8, 0, 3, 1};
+  const DepartedLight seen(light, fit.departure);
+  const EdgeMeasurements edges = measure_edges(scene, seen.light(), fit.unknowns, film_mean_m, farther, fit.blur);
+  for (const std::size_t boundary : {1U, 2U})
+    if (is_doubtful(fit, boundary) &&
+        shows_elsewhere(edges, boundary, fit.bias_px[boundary], scene.marker.boundary_sigma_m()))
+      return true;
+  return false;
 }
 
 }  // namespace lapservo::internal

@@ -66,7 +66,7 @@ TEST(BlurredBoundary, ALensLeavesNoLean) {
 FineFit fit_to_motion(const Shot& shot, const Eigen::Vector2d& along_and_across_px, const EdgeBlur& blur) {
   const scenes::Motion motion{.along_and_across_px = along_and_across_px};
   const scenes::Sight sight(shot.rig, scenes::render_moving(shot.rig, shot.q, motion));
-  return fit_finely(sight.scene(), sight.light(), shot.truth(true), blur);
+  return fit_finely(sight.scene(), sight.light(), shot.truth(true), {.blur = blur});
 }
 
 // Psi's other error (the film's thickness) is alike for two motions that are mirrored at the shaft: only what the fit

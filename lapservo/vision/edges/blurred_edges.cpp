@@ -26,8 +26,7 @@ BlurredEdge integrate(double u) {
 }  // namespace
 
 BlurredEdges::BlurredEdges() {
-  for (std::size_t i = 0; i < entries_.size(); ++i)
-    entries_[i] = integrate(first_u + static_cast<double>(i) / per_sigma);
+  for (std::size_t i = 0; i < entries.size(); ++i) entries[i] = integrate(first_u + static_cast<double>(i) / per_sigma);
 }
 
 const BlurredEdges& BlurredEdges::instance() {

@@ -15,8 +15,13 @@ struct BlurredEdge {
 };
 
 /// Tabulates them; errors below 1e-4.
-class BlurredEdges {
- public:
+struct BlurredEdges {
+  /// Entry i holds u = first_u + i / per_sigma, up to last_u and one beyond.
+  static constexpr float first_u = -6, last_u = 8;
+  static constexpr int per_sigma = 64;
+  std::array<BlurredEdge, static_cast<std::size_t>((last_u - first_u) * per_sigma) + 2> entries;
+
+  BlurredEdges();
   /// The one table.
   static const BlurredEdges& instance();
 
@@ -29,20 +34,10 @@ class BlurredEdges {
     const float place = (u - first_u) * per_sigma;
     const auto i = static_cast<std::size_t>(place);
     const float f = place - static_cast<float>(i);
-    const BlurredEdge &a = entries_[i], &b = entries_[i + 1];
+    const BlurredEdge &a = entries[i], &b = entries[i + 1];
     return {a.density + f * (b.density - a.density), a.step + f * (b.step - a.step), a.root + f * (b.root - a.root),
             a.three_halves + f * (b.three_halves - a.three_halves), a.root_slope + f * (b.root_slope - a.root_slope)};
   }
-
-  /// The table itself: entry i holds u = first_u + i / per_sigma, up to last_u and one beyond.
-  static constexpr float first_u = -6, last_u = 8;
-  static constexpr int per_sigma = 64;
-  const BlurredEdge* entries() const { return entries_.data(); }
-
- private:
-  BlurredEdges();
-
-  std::array<BlurredEdge, static_cast<std::size_t>((last_u - first_u) * per_sigma) + 2> entries_;
 };
 
 }  // namespace lapservo::internal

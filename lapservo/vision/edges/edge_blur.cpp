@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Cholesky>
-
 namespace lapservo::internal {
 namespace {
 
@@ -19,10 +17,6 @@ double BlurEllipse::along_normal_px(const Eigen::Vector2d& normal) const {
   const double variance = normal.x() * normal.x() * along_px2 + normal.y() * normal.y() * across_px2 +
                           2 * normal.x() * normal.y() * oblique_px2;
   return std::sqrt(std::max(blur_limits.min_blur_px * blur_limits.min_blur_px, variance));
-}
-
-double EdgeBlur::widest_px() const {
-  return std::max(*std::max_element(along_px.begin(), along_px.end()), sides_px);
 }
 
 BlurEllipse EdgeBlur::ellipse(std::size_t boundary) const {
@@ -49,19 +43,20 @@ void EllipseEvidence::add(const EdgeFit& edge, double variance, const EdgeBlur& 
   information_ += edge.blur_information / variance * row * row.transpose();
 }
 
-EllipseEvidence::Equations EllipseEvidence::with_prior(const EdgeBlur& blur) const {
+EllipseEvidence::Step EllipseEvidence::step_from(const EdgeBlur& blur) const {
   // Blur that is not seen is taken to be as the others', and the correlation to be none.
   const double mean_px = blur.boundaries_px();
-  Equations equations{information_, gradient_};
-  equations.information.diagonal().array() += 1;
-  for (int k = 0; k < 4; ++k) equations.gradient[k] += mean_px - blur.along_px[static_cast<std::size_t>(k)];
-  equations.gradient[4] -= blur.correlation;
-  return equations;
+  Information information = information_;
+  Numbers gradient = gradient_;
+  information.diagonal().array() += 1;
+  for (int k = 0; k < 4; ++k) gradient[k] += mean_px - blur.along_px[static_cast<std::size_t>(k)];
+  gradient[4] -= blur.correlation;
+  const Eigen::LDLT<Information> factor(information);
+  return {factor, factor.solve(gradient)};
 }
 
 EdgeBlur EllipseEvidence::improved(const EdgeBlur& blur) const {
-  const Equations equations = with_prior(blur);
-  const Numbers change = equations.information.ldlt().solve(equations.gradient);
+  const Numbers change = step_from(blur).change;
   if (!change.allFinite()) return blur;
   EdgeBlur next = blur;
   for (std::size_t k = 0; k < 4; ++k)
@@ -71,10 +66,8 @@ EdgeBlur EllipseEvidence::improved(const EdgeBlur& blur) const {
 }
 
 EllipseEvidence::Squares EllipseEvidence::squares(const EdgeBlur& blur) const {
-  const Equations equations = with_prior(blur);
-  const Eigen::LDLT<Information> factor(equations.information);
-  const Numbers change = factor.solve(equations.gradient);
-  const Information covariance = factor.solve(Information::Identity());
+  const auto [information, change] = step_from(blur);
+  const Information covariance = information.solve(Information::Identity());
   const Eigen::Map<const Eigen::Vector4d> along_px(blur.along_px.data());
   const Eigen::Vector4d twice_px = 2 * along_px;
   return {along_px.cwiseAbs2() + twice_px.cwiseProduct(change.head<4>()),

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 
+#include <Eigen/Cholesky>
 #include <Eigen/Core>
 
 #include "lapservo/vision/edges/edge_profile.h"
@@ -54,12 +56,11 @@ struct EdgeBlur {
 
   EdgeBlur() : EdgeBlur(usual_blur_px, usual_blur_px) {}
   /// The same along the shaft for all boundaries.
-  EdgeBlur(double boundaries_px, double across_px)
-      : along_px{boundaries_px, boundaries_px, boundaries_px, boundaries_px}, sides_px(across_px) {}
+  EdgeBlur(double boundaries_px, double across_px) : sides_px(across_px) { along_px.fill(boundaries_px); }
 
   /// Mean of the boundaries'.
   double boundaries_px() const { return (along_px[0] + along_px[1] + along_px[2] + along_px[3]) / 4; }
-  double widest_px() const;
+  double widest_px() const { return std::max(std::ranges::max(along_px), sides_px); }
   BlurEllipse ellipse(std::size_t boundary) const;
 };
 
@@ -97,12 +98,12 @@ class EllipseEvidence {
   using Numbers = Eigen::Matrix<double, numbers, 1>;
   using Information = Eigen::Matrix<double, numbers, numbers>;
 
-  // Gauss-Newton's equations: what the boundaries say, and what is expected.
-  struct Equations {
-    Information information;
-    Numbers gradient;
+  // Gauss-Newton's, by what the boundaries say and what is expected.
+  struct Step {
+    Eigen::LDLT<Information> information;
+    Numbers change;
   };
-  Equations with_prior(const EdgeBlur& blur) const;
+  Step step_from(const EdgeBlur& blur) const;
 
   Numbers gradient_ = Numbers::Zero();
   Information information_ = Information::Zero();

@@ -6,9 +6,7 @@
 
 #include "lapservo/core/random.h"
 
-namespace lapservo::internal {
-namespace edge_blur_test {
-namespace {
+namespace lapservo::internal::edge_blur_test {
 
 // Edges whose blur along the line is `truth`'s, as located with `blur`: what a fit of their width says.
 EllipseEvidence evidence_of(const EdgeBlur& truth, const EdgeBlur& blur, std::size_t boundaries = 4) {
@@ -19,9 +17,7 @@ EllipseEvidence evidence_of(const EdgeBlur& truth, const EdgeBlur& blur, std::si
       const double along = std::abs(normal.x());
       const double off_px =
           (truth.ellipse(k).along_normal_px(normal) - blur.ellipse(k).along_normal_px(normal)) / along;
-      EdgeFit edge;
-      edge.blur_information = 100;
-      edge.blur_gradient = edge.blur_information * static_cast<float>(off_px);
+      const EdgeFit edge{.blur_gradient = 100 * static_cast<float>(off_px), .blur_information = 100};
       evidence.add(edge, 0.01, blur, k, normal);
     }
   return evidence;
@@ -73,6 +69,4 @@ TEST(EdgeBlur, IsAnEllipseWhateverEdgesSay) {
   EXPECT_TRUE(std::isfinite(unseen.boundaries_px()) && std::isfinite(unseen.correlation));
 }
 
-}  // namespace
-}  // namespace edge_blur_test
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::edge_blur_test

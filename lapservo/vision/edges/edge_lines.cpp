@@ -169,47 +169,47 @@ HWY_INLINE BlurredLanes blurred_at(const BlurredEdge* table, V u) {
 
 // The dot products of columns with one, which is read once.
 template <std::size_t Count>
-HWY_INLINE std::array<V, Count> dots(const std::array<const Column*, Count>& columns, const Column& with,
+HWY_INLINE std::array<V, Count> dots(const std::array<Column, Count>& columns, const Column& with,
                                      std::size_t samples) {
   std::array<V, Count> sums;
   sums.fill(hn::Zero(Floats()));
   for (std::size_t i = 0; i < samples; ++i) {
     const V here = with[i].load();
-    for (std::size_t k = 0; k < Count; ++k) sums[k] = hn::MulAdd((*columns[k])[i].load(), here, sums[k]);
+    for (std::size_t k = 0; k < Count; ++k) sums[k] = hn::MulAdd(columns[k][i].load(), here, sums[k]);
   }
   return sums;
 }
 
 HWY_INLINE V dot(const Column& a, const Column& b, std::size_t samples) {
-  return dots<1>({&a}, b, samples)[0];
+  V sum = hn::Zero(Floats());
+  for (std::size_t i = 0; i < samples; ++i) sum = hn::MulAdd(a[i].load(), b[i].load(), sum);
+  return sum;
 }
 
 // The model's linear basis, a constant and then the shapes, made orthonormal; and the shapes' derivatives by the edge's
-// position and by the blur, with the Gram matrices of what the basis can't imitate of them. Common to the three
+// position and then by the blur, with the Gram matrix of what the basis can't imitate of them. Common to the three
 // channels.
 template <std::size_t Shapes>
 struct Basis {
-  static constexpr std::size_t linear = Shapes + 1;
-  using Columns = std::array<Column, Shapes>;
-  using Imitated = std::array<std::array<V, linear>, Shapes>;  // of each derivative, along each unit
-  using Gram = std::array<std::array<V, Shapes>, Shapes>;
+  static constexpr std::size_t linear = Shapes + 1, derivatives = 2 * Shapes;
 
-  std::array<Column, linear> unit;
-  std::array<std::array<V, linear>, linear> triangle;  // of the orthogonalisation
-  Columns by_position, by_blur;
-  Imitated position_imitated, blur_imitated;
-  Gram position_gram, blur_gram, both_gram;  // both: of derivatives by position (first index) with those by blur
+  std::array<Column, linear + derivatives> columns;
+  std::array<std::array<V, linear>, linear> triangle;       // of the orthogonalisation
+  std::array<std::array<V, linear>, derivatives> imitated;  // of each derivative, along each unit
+  std::array<std::array<V, derivatives>, derivatives> gram;
   Mask independent;
 
   Basis(const LineLanes& lines, const Column& present, V edge_px) {
     fill(lines, present, edge_px);
     orthogonalise(lines, present);
-    tell_apart(by_position, lines.samples, position_imitated, position_gram);
-    tell_apart(by_blur, lines.samples, blur_imitated, blur_gram);
-    for (std::size_t t = 0; t < Shapes; ++t) {
-      const auto products = dots(pointers(by_position), by_blur[t], lines.samples);
-      for (std::size_t s = 0; s < Shapes; ++s)
-        both_gram[s][t] = left_of(products[s], position_imitated[s], blur_imitated[t]);
+    for (std::size_t s = 0; s < derivatives; ++s) {
+      const auto products = dots(columns, columns[linear + s], lines.samples);
+      std::copy_n(products.begin(), linear, imitated[s].begin());
+      for (std::size_t r = 0; r <= s; ++r) {
+        V left = products[linear + r];
+        for (std::size_t j = 0; j < linear; ++j) left = hn::NegMulAdd(imitated[s][j], imitated[r][j], left);
+        gram[s][r] = gram[r][s] = left;
+      }
     }
   }
 
@@ -225,21 +225,22 @@ struct Basis {
       rise = hn::Mul(root_scale, root_blur), fall = hn::Div(root_scale, root_blur);
       bend = hn::Div(blur, hn::Mul(hn::Set(d, 4), radius));
     }
-    const BlurredEdge* table = BlurredEdges::instance().entries();
+    const BlurredEdge* table = BlurredEdges::instance().entries.data();
     V from_edge = hn::Sub(lines.first.load(), edge_px);
     for (std::size_t i = 0; i < lines.samples; ++i, from_edge = hn::Add(from_edge, one)) {
       const V here = present[i].load(), u = hn::Mul(from_edge, inverse_blur);
       const BlurredLanes edge = blurred_at<Shapes == 2>(table, u);
       const V slope = hn::Neg(hn::Mul(hn::Mul(here, edge.density), inverse_blur));
-      unit[1][i].store(hn::Mul(here, edge.step));
-      by_position[0][i].store(slope);
-      by_blur[0][i].store(hn::Mul(slope, u));
+      columns[1][i].store(hn::Mul(here, edge.step));
+      columns[linear][i].store(slope);
+      columns[linear + Shapes][i].store(hn::Mul(slope, u));
       if constexpr (Shapes == 2) {
         const V up = hn::Mul(here, rise), down = hn::Mul(here, fall);
         const V bent = hn::Mul(hn::Mul(bend, hn::Set(d, 3.0F / 2)), edge.root);
-        unit[2][i].store(hn::Mul(up, hn::NegMulAdd(bend, edge.three_halves, edge.root)));
-        by_position[1][i].store(hn::Mul(down, hn::Sub(bent, edge.root_slope)));
-        by_blur[1][i].store(hn::Mul(down, hn::NegMulAdd(u, edge.root_slope, hn::Mul(hn::Set(d, 0.5F), edge.root))));
+        columns[2][i].store(hn::Mul(up, hn::NegMulAdd(bend, edge.three_halves, edge.root)));
+        columns[linear + 1][i].store(hn::Mul(down, hn::Sub(bent, edge.root_slope)));
+        columns[linear + 3][i].store(
+            hn::Mul(down, hn::NegMulAdd(u, edge.root_slope, hn::Mul(hn::Set(d, 0.5F), edge.root))));
       }
     }
   }
@@ -249,15 +250,15 @@ struct Basis {
     const std::size_t samples = lines.samples;
     triangle[0][0] = hn::Sqrt(samples_of(lines));
     const V constant = hn::Div(hn::Set(d, 1), triangle[0][0]);
-    for (std::size_t i = 0; i < samples; ++i) unit[0][i].store(hn::Mul(constant, present[i].load()));
+    for (std::size_t i = 0; i < samples; ++i) columns[0][i].store(hn::Mul(constant, present[i].load()));
     independent = hn::Eq(constant, constant);
     for (std::size_t j = 1; j < linear; ++j) {
-      Column& column = unit[j];
+      Column& column = columns[j];
       const V before = dot(column, column, samples);
       for (std::size_t k = 0; k < j; ++k) {
-        triangle[k][j] = dot(unit[k], column, samples);
+        triangle[k][j] = dot(columns[k], column, samples);
         for (std::size_t i = 0; i < samples; ++i)
-          column[i].store(hn::NegMulAdd(triangle[k][j], unit[k][i].load(), column[i].load()));
+          column[i].store(hn::NegMulAdd(triangle[k][j], columns[k][i].load(), column[i].load()));
       }
       const V square = dot(column, column, samples);
       independent = hn::And(independent, hn::Gt(square, hn::Mul(hn::Set(d, 1e-5F), before)));
@@ -266,35 +267,12 @@ struct Basis {
       for (std::size_t i = 0; i < samples; ++i) column[i].store(hn::Mul(factor, column[i].load()));
     }
   }
-
-  static std::array<const Column*, Shapes> pointers(const Columns& columns) {
-    std::array<const Column*, Shapes> out;
-    for (std::size_t s = 0; s < Shapes; ++s) out[s] = &columns[s];
-    return out;
-  }
-  // The part of the product of two derivatives that the basis can't imitate.
-  static V left_of(V product, const std::array<V, linear>& a, const std::array<V, linear>& b) {
-    for (std::size_t j = 0; j < linear; ++j) product = hn::NegMulAdd(a[j], b[j], product);
-    return product;
-  }
-
-  void tell_apart(const Columns& derivatives, std::size_t samples, Imitated& imitated, Gram& gram) const {
-    for (std::size_t s = 0; s < Shapes; ++s) {
-      std::array<const Column*, linear + Shapes> columns;
-      for (std::size_t j = 0; j < linear; ++j) columns[j] = &unit[j];
-      for (std::size_t r = 0; r < Shapes; ++r) columns[linear + r] = &derivatives[r];
-      const auto products = dots(columns, derivatives[s], samples);
-      std::copy_n(products.begin(), linear, imitated[s].begin());
-      for (std::size_t r = 0; r <= s; ++r)
-        gram[s][r] = gram[r][s] = left_of(products[linear + r], imitated[s], imitated[r]);
-    }
-  }
 };
 
 // EdgeFit in every lane.
 struct FitLanes {
-  V offset, information, residual_variance, blur_gradient, blur_information;
-  std::array<V, 3> step, before;
+  enum Value { offset, information, residual_variance, blur_gradient, blur_information, step, before = step + 3 };
+  std::array<V, before + 3> value;
   Mask converged;
 };
 
@@ -307,16 +285,13 @@ FitLanes project(const LineLanes& lines, const std::array<Column, 3>& light, V s
   const V zero = hn::Zero(d);
   const Basis<Shapes> basis(lines, present, edge_px);
   constexpr std::size_t linear = Basis<Shapes>::linear;
-  std::array<const Column*, linear + 2 * Shapes> columns;
-  for (std::size_t j = 0; j < linear; ++j) columns[j] = &basis.unit[j];
-  for (std::size_t s = 0; s < Shapes; ++s) {
-    columns[linear + s] = &basis.by_position[s];
-    columns[linear + Shapes + s] = &basis.by_blur[s];
-  }
-  FitLanes fit{zero, zero, zero, zero, zero, {zero, zero, zero}, {zero, zero, zero}, basis.independent};
-  V position_gradient = zero, position_and_blur = zero;
+  FitLanes fit;
+  fit.value.fill(zero);
+  // By position, then by blur.
+  std::array<V, 2> gradient{zero, zero};
+  std::array<std::array<V, 2>, 2> information{gradient, gradient};
   for (std::size_t c = 0; c < 3; ++c) {
-    const auto products = dots(columns, light[c], lines.samples);
+    const auto products = dots(basis.columns, light[c], lines.samples);
     std::array<V, linear> amplitude;
     for (std::size_t j = 0; j < linear; ++j) {
       amplitude[j] = products[j];
@@ -327,54 +302,39 @@ FitLanes project(const LineLanes& lines, const std::array<Column, 3>& light, V s
         amplitude[j] = hn::NegMulAdd(basis.triangle[j][k], amplitude[k], amplitude[j]);
       amplitude[j] = hn::Div(amplitude[j], basis.triangle[j][j]);
     }
-    fit.before[c] = amplitude[0];
+    fit.value[FitLanes::before + c] = amplitude[0];
     for (std::size_t s = 0; s < Shapes; ++s) {
       const V a = amplitude[s + 1];
-      V by_position = products[linear + s], by_blur = products[linear + Shapes + s];
-      for (std::size_t j = 0; j < linear; ++j) {
-        by_position = hn::NegMulAdd(basis.position_imitated[s][j], products[j], by_position);
-        by_blur = hn::NegMulAdd(basis.blur_imitated[s][j], products[j], by_blur);
+      for (std::size_t by = 0; by < 2; ++by) {
+        const std::size_t derivative = by * Shapes + s;
+        V left = products[linear + derivative];
+        for (std::size_t j = 0; j < linear; ++j) left = hn::NegMulAdd(basis.imitated[derivative][j], products[j], left);
+        gradient[by] = hn::MulAdd(a, left, gradient[by]);
+        for (std::size_t and_by = by; and_by < 2; ++and_by)
+          for (std::size_t t = 0; t < Shapes; ++t)
+            information[by][and_by] = hn::MulAdd(hn::Mul(a, amplitude[t + 1]),
+                                                 basis.gram[derivative][and_by * Shapes + t], information[by][and_by]);
       }
-      position_gradient = hn::MulAdd(a, by_position, position_gradient);
-      fit.blur_gradient = hn::MulAdd(a, by_blur, fit.blur_gradient);
-      for (std::size_t t = 0; t < Shapes; ++t) {
-        const V both = hn::Mul(a, amplitude[t + 1]);
-        fit.information = hn::MulAdd(both, basis.position_gram[s][t], fit.information);
-        fit.blur_information = hn::MulAdd(both, basis.blur_gram[s][t], fit.blur_information);
-        position_and_blur = hn::MulAdd(both, basis.both_gram[s][t], position_and_blur);
-      }
-      fit.step[c] = hn::Add(fit.step[c], a);
+      V& step = fit.value[FitLanes::step + c];
+      step = hn::Add(step, a);
     }
   }
   const V degrees =
       hn::MulAdd(hn::Set(d, 3), hn::Sub(samples_of(lines), hn::Set(d, static_cast<float>(linear))), hn::Set(d, -1));
-  fit.offset = hn::Div(position_gradient, fit.information);
+  const V offset = hn::Div(gradient[0], information[0][0]), both = information[0][1];
+  const V variance = hn::Div(hn::Max(zero, squares), degrees);
+  fit.value[FitLanes::offset] = offset;
+  fit.value[FitLanes::information] = information[0][0];
+  fit.value[FitLanes::residual_variance] = variance;
   // For the blur, whatever the position is.
-  fit.blur_gradient = hn::NegMulAdd(fit.offset, position_and_blur, fit.blur_gradient);
-  fit.blur_information =
-      hn::NegMulAdd(hn::Div(position_and_blur, fit.information), position_and_blur, fit.blur_information);
-  fit.residual_variance = hn::Div(hn::Max(zero, squares), degrees);
+  fit.value[FitLanes::blur_gradient] = hn::NegMulAdd(offset, both, gradient[1]);
+  fit.value[FitLanes::blur_information] = hn::NegMulAdd(hn::Div(both, information[0][0]), both, information[1][1]);
   // Comparisons with what is not finite are false.
   const V huge = hn::Set(d, 1e30F);
-  fit.converged = hn::And(hn::And(fit.converged, hn::Gt(fit.information, hn::Set(d, min_edge_information))),
-                          hn::And(hn::Ge(degrees, hn::Set(d, 3)),
-                                  hn::And(hn::Lt(hn::Abs(fit.offset), huge), hn::Lt(fit.residual_variance, huge))));
+  fit.converged =
+      hn::And(hn::And(basis.independent, hn::Gt(information[0][0], hn::Set(d, min_edge_information))),
+              hn::And(hn::Ge(degrees, hn::Set(d, 3)), hn::And(hn::Lt(hn::Abs(offset), huge), hn::Lt(variance, huge))));
   return fit;
-}
-
-FitLanes select(Mask mask, const FitLanes& yes, const FitLanes& no) {
-  FitLanes out;
-  out.offset = hn::IfThenElse(mask, yes.offset, no.offset);
-  out.information = hn::IfThenElse(mask, yes.information, no.information);
-  out.residual_variance = hn::IfThenElse(mask, yes.residual_variance, no.residual_variance);
-  out.blur_gradient = hn::IfThenElse(mask, yes.blur_gradient, no.blur_gradient);
-  out.blur_information = hn::IfThenElse(mask, yes.blur_information, no.blur_information);
-  for (std::size_t c = 0; c < 3; ++c) {
-    out.step[c] = hn::IfThenElse(mask, yes.step[c], no.step[c]);
-    out.before[c] = hn::IfThenElse(mask, yes.before[c], no.before[c]);
-  }
-  out.converged = hn::Or(hn::And(mask, yes.converged), hn::AndNot(mask, no.converged));
-  return out;
 }
 
 // iterate() of edge_profile.cpp in every lane.
@@ -388,16 +348,20 @@ FitLanes iterate(const LineLanes& lines, const std::array<Column, 3>& light, con
   FitLanes fit{};
   Mask active = hn::Eq(edge_px, edge_px);
   for (int iteration = 0; iteration < iterations && !hn::AllFalse(d, active); ++iteration) {
-    fit = select(active, project<Shapes>(lines, light, squares, present, edge_px), fit);
+    const FitLanes next = project<Shapes>(lines, light, squares, present, edge_px);
+    for (std::size_t i = 0; i < fit.value.size(); ++i)
+      fit.value[i] = hn::IfThenElse(active, next.value[i], fit.value[i]);
+    fit.converged = hn::Or(hn::And(active, next.converged), hn::AndNot(active, fit.converged));
     active = hn::And(active, fit.converged);
-    const V step = hn::Min(hn::Max(fit.offset, hn::Set(d, -2)), hn::Set(d, 2));
+    const V step = hn::Min(hn::Max(fit.value[FitLanes::offset], hn::Set(d, -2)), hn::Set(d, 2));
     edge_px = hn::IfThenElse(active, hn::Add(edge_px, step), edge_px);
     fit.converged = hn::And(fit.converged, hn::Le(hn::Abs(edge_px), reach));
     active = hn::And(hn::And(active, fit.converged), hn::Ge(hn::Abs(step), hn::Set(d, edge_tolerance_px)));
   }
   const V largest = hn::Set(d, iterations > 1 ? max_last_step_px : max_only_step_px);
-  fit.converged = hn::And(fit.converged, hn::Lt(hn::Abs(fit.offset), largest));
-  fit.offset = edge_px;
+  V& offset = fit.value[FitLanes::offset];
+  fit.converged = hn::And(fit.converged, hn::Lt(hn::Abs(offset), largest));
+  offset = edge_px;
   return fit;
 }
 
@@ -412,40 +376,36 @@ void locate(const LightImage& image, std::span<const EdgeLine> lines, int iterat
   const SampledLanes sampled =
       image.channels().differs() ? sample<true>(image, lanes, present) : sample<false>(image, lanes, present);
   const FitLanes fit = iterate<Shapes>(lanes, sampled.light, present, iterations);
-  Lanes offset, information, variance, blur_gradient, blur_information, converged;
-  std::array<Lanes, 3> step, before;
-  offset.store(fit.offset), information.store(fit.information), variance.store(fit.residual_variance);
-  blur_gradient.store(fit.blur_gradient), blur_information.store(fit.blur_information);
-  for (std::size_t c = 0; c < 3; ++c) step[c].store(fit.step[c]), before[c].store(fit.before[c]);
+  std::array<Lanes, std::tuple_size_v<decltype(fit.value)>> values;
+  for (std::size_t i = 0; i < values.size(); ++i) values[i].store(fit.value[i]);
+  Lanes converged;
   converged.store(hn::IfThenElseZero(fit.converged, hn::Set(d, 1)));
   for (std::size_t j = 0; j < lines.size(); ++j) {
-    const auto of = [j](const Lanes& lane) { return lane.value[j]; };
-    if (of(sampled.brightest) >= LightImage::saturated_value) {
+    if (sampled.brightest.value[j] >= LightImage::saturated_value) {
       fits.push_back(locate_edge(image, lines[j], Shapes == 1 ? EdgeKind::step : EdgeKind::contour, iterations));
-    } else {
-      fits.push_back({of(converged) > 0,
-                      of(offset),
-                      of(information),
-                      of(variance),
-                      {of(step[0]), of(step[1]), of(step[2])},
-                      {of(before[0]), of(before[1]), of(before[2])},
-                      of(blur_gradient),
-                      of(blur_information)});
+      continue;
     }
+    const auto of = [&](FitLanes::Value value, std::size_t c = 0) { return values[value + c].value[j]; };
+    using enum FitLanes::Value;
+    fits.push_back({converged.value[j] > 0,
+                    of(offset),
+                    of(information),
+                    of(residual_variance),
+                    {of(step), of(step, 1), of(step, 2)},
+                    {of(before), of(before, 1), of(before, 2)},
+                    of(blur_gradient),
+                    of(blur_information)});
   }
 }
 
-template <std::size_t Shapes>
-EdgeFits locate_all(const LightImage& image, std::span<const EdgeLine> lines, int iterations) {
+EdgeFits locate_edges(const LightImage& image, std::span<const EdgeLine> lines, EdgeKind kind, int iterations) {
   EdgeFits fits;
   const std::size_t lanes = hn::Lanes(Floats());
-  for (std::size_t i = 0; i < lines.size(); i += lanes)
-    locate<Shapes>(image, lines.subspan(i, std::min(lanes, lines.size() - i)), iterations, fits);
+  for (std::size_t i = 0; i < lines.size(); i += lanes) {
+    const auto some = lines.subspan(i, std::min(lanes, lines.size() - i));
+    kind == EdgeKind::step ? locate<1>(image, some, iterations, fits) : locate<2>(image, some, iterations, fits);
+  }
   return fits;
-}
-
-EdgeFits locate_edges(const LightImage& image, std::span<const EdgeLine> lines, EdgeKind kind, int iterations) {
-  return kind == EdgeKind::step ? locate_all<1>(image, lines, iterations) : locate_all<2>(image, lines, iterations);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -457,9 +417,7 @@ namespace lapservo::internal {
 
 HWY_EXPORT(locate_edges);
 
-namespace {
-
-EdgeProfile sample_profile(const LightImage& light, const EdgeLine& line) {
+EdgeFit locate_edge(const LightImage& light, const EdgeLine& line, EdgeKind kind, int iterations) {
   EdgeProfile profile;
   profile.first_px = static_cast<float>(-line.before);
   profile.count = static_cast<std::size_t>(line.before + line.after + 1);
@@ -471,13 +429,6 @@ EdgeProfile sample_profile(const LightImage& light, const EdgeLine& line) {
       profile.usable[c][i] = !sample.saturated[c];
     }
   }
-  return profile;
-}
-
-}  // namespace
-
-EdgeFit locate_edge(const LightImage& light, const EdgeLine& line, EdgeKind kind, int iterations) {
-  const EdgeProfile profile = sample_profile(light, line);
   return kind == EdgeKind::step ? fit_step(profile, line.blur_px, iterations)
                                 : fit_contour(profile, line.blur_px, line.contour_radius_px, iterations);
 }

@@ -141,10 +141,8 @@ TEST_P(EdgeLines, MayReachTheImagesCorner) {
   const cv::Mat image = picture(GetParam(), 1);
   const ImageView view(image);
   const LightImage light(view, table);
-  EdgeLine line;
-  line.u_px = 118.98F, line.v_px = 98.98F;
-  line.before = 8, line.after = 20;
-  line.blur_px = 1.2F, line.contour_radius_px = 45;
+  const EdgeLine line{
+      .u_px = 118.98F, .v_px = 98.98F, .before = 8, .after = 20, .blur_px = 1.2F, .contour_radius_px = 45};
   on_every_target([&] { EXPECT_EQ(together(light, {&line, 1}, 2).size(), 1); });
 }
 

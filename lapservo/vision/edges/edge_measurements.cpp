@@ -22,6 +22,9 @@ struct Generatrix {
   Eigen::Vector3d outwards_unrolled, outwards, around, begin;
 };
 
+constexpr double aside_rad = 0.05;
+using Neighbourhood = std::array<Generatrix, 3>;  // a generatrix between those as far aside of it on either side
+
 struct Frame {
   const Scene& scene;
   const LightImage& light;
@@ -44,6 +47,14 @@ struct Frame {
             cosine * axes.col(1) - sine * axes.col(0),
             unknowns.pose().camera_from_unrolled.translation + marker().radius_m() * outwards};
   }
+  Neighbourhood neighbourhood(double azimuth_rad) const {
+    static const double cosine = std::cos(aside_rad), sine = std::sin(aside_rad);
+    const double x = std::cos(azimuth_rad), y = std::sin(azimuth_rad);
+    const auto turned = [&](double way) {
+      return generatrix(azimuth_rad + way * aside_rad, cosine * x - way * sine * y, cosine * y + way * sine * x);
+    };
+    return {turned(-1), generatrix(azimuth_rad, x, y), turned(1)};
+  }
   Eigen::Vector3d point(const Generatrix& line, double along_m) const { return line.begin + along_m * axes.col(2); }
   Facing facing(std::size_t k, const Generatrix& line, double along_m) const {
     Eigen::Vector3d to_camera = camera_in_unrolled - marker().radius_m() * line.outwards_unrolled;
@@ -59,9 +70,10 @@ struct Frame {
   }
   double tau(double azimuth_rad) const { return marker_azimuth_rad(marker(), azimuth_rad, unknowns.pose().psi_rad); }
 
-  // The line through a point of the image, when all of it can be sampled.
-  std::optional<EdgeLine> edge_line(const Eigen::Vector2d& centre_px, const Eigen::Vector2d& direction, int before,
-                                    int after, double blur_px) const {
+  // The line through the image of a point of a generatrix, when all of it can be sampled and no other instrument lies
+  // before its ends or its middle.
+  std::optional<EdgeLine> edge_line(const Generatrix& generatrix, double along_m, const Eigen::Vector2d& centre_px,
+                                    const Eigen::Vector2d& direction, int before, int after, double blur_px) const {
     if (!light.contains(centre_px - before * direction) || !light.contains(centre_px + after * direction))
       return std::nullopt;
     EdgeLine line;
@@ -69,35 +81,11 @@ struct Frame {
     line.du = static_cast<float>(direction.x()), line.dv = static_cast<float>(direction.y());
     line.before = before, line.after = after;
     line.blur_px = static_cast<float>(blur_px);
+    const double depth_m = point(generatrix, along_m).z();
+    for (const int at : {0, -before, after})
+      if (scene.hidden(Eigen::Vector2d(line.u_px, line.v_px) + at * Eigen::Vector2d(line.du, line.dv), depth_m))
+        return std::nullopt;
     return line;
-  }
-};
-
-// Whether another instrument lies before a line through a point of the shaft, or before a part of it.
-bool lies_behind_another(const Frame& frame, const EdgeLine& line, const Generatrix& generatrix, double along_m) {
-  if (frame.scene.others.empty()) return false;
-  const double depth_m = frame.point(generatrix, along_m).z();
-  const Eigen::Vector2d centre_px(line.u_px, line.v_px), direction(line.du, line.dv);
-  return frame.scene.hidden(centre_px, depth_m) || frame.scene.hidden(centre_px - line.before * direction, depth_m) ||
-         frame.scene.hidden(centre_px + line.after * direction, depth_m);
-}
-
-constexpr double aside_rad = 0.05;
-
-// A generatrix, and those as far aside of it on either side.
-struct Neighbourhood {
-  Generatrix middle;
-  std::array<Generatrix, 2> aside;
-
-  Neighbourhood(const Frame& frame, double azimuth_rad)
-      : middle(frame.generatrix(azimuth_rad)), aside{turned(frame, -1), turned(frame, 1)} {}
-
- private:
-  Generatrix turned(const Frame& frame, double way) const {
-    static const double cosine = std::cos(aside_rad), sine = std::sin(aside_rad);
-    const double x = middle.outwards_unrolled.x(), y = middle.outwards_unrolled.y();
-    return frame.generatrix(middle.azimuth_rad + way * aside_rad, cosine * x - way * sine * y,
-                            cosine * y + way * sine * x);
   }
 };
 
@@ -109,7 +97,7 @@ BoundaryCourse course_of(const Frame& frame, const Neighbourhood& generatrices, 
   std::array<Eigen::Vector2d, 2> places_px;
   std::array<double, 2> light;
   for (std::size_t i = 0; i < 2; ++i) {
-    const Generatrix& aside = generatrices.aside[i];
+    const Generatrix& aside = generatrices[2 * i];
     const double there_m = along_m + (i == 0 ? -aside_rad : aside_rad) * slope_m;
     const Eigen::Vector2d from_px =
         frame.scene.camera.raw_from_point(frame.point(aside, there_m) - depth_m * aside.outwards) - point_px;
@@ -118,11 +106,10 @@ BoundaryCourse course_of(const Frame& frame, const Neighbourhood& generatrices, 
   }
   const Eigen::Vector2d &a = places_px[0], &b = places_px[1];
   const double slope_a = a.x() / a.y(), slope_b = b.x() / b.y(), apart_px = b.y() - a.y();
-  BoundaryCourse course;
-  course.curvature_per_px = 2 * (slope_b - slope_a) / apart_px;
-  course.slope = slope_a - 0.5 * course.curvature_per_px * a.y();
-  course.light_change_per_px = 2 * (light[1] - light[0]) / (light[1] + light[0]) / apart_px;
-  return course;
+  const double curvature_per_px = 2 * (slope_b - slope_a) / apart_px;
+  return {.slope = slope_a - 0.5 * curvature_per_px * a.y(),
+          .curvature_per_px = curvature_per_px,
+          .light_change_per_px = 2 * (light[1] - light[0]) / (light[1] + light[0]) / apart_px};
 }
 
 // A boundary on a generatrix, where it is expected; all of the measurement but residual and sigma.
@@ -131,6 +118,7 @@ struct BoundaryPlace {
   Eigen::Vector2d point_px, along;
   Eigen::Vector2d normal;  // of the boundary, its parts along the shaft and across it
   EdgeLine line;
+  EdgeFit edge;  // once it is located
   Facing facing;
   double film_shift;         // by which fraction of its projected width the film's edge is expected to move it
   double film_px_per_m;      // that width by the film's thickness, along the normal
@@ -143,25 +131,26 @@ struct BoundaryPlace {
 
 // Whether the pixels on both sides have the colours that should be there. A blurred band tints the shaft beyond its
 // end.
-bool colours_agree(const Frame& frame, const BoundaryPlace& place, float offset_px) {
+bool colours_agree(const Frame& frame, const BoundaryPlace& place) {
   const std::size_t k = place.measurement.group;
-  const Eigen::Vector2d at_px = place.point_px + static_cast<double>(offset_px) * place.along;
+  const Eigen::Vector2d at_px = place.point_px + static_cast<double>(place.edge.offset_px) * place.along;
   const double on_band_px = 0.8 * place.line.before, on_shaft_px = on_band_px + 1.5 * place.line.blur_px;
   const std::uint8_t before = frame.scene.class_at(at_px - (k == 0 ? on_shaft_px : on_band_px) * place.along);
   const std::uint8_t after = frame.scene.class_at(at_px + (k == 3 ? on_shaft_px : on_band_px) * place.along);
   return before == (k == 0 ? 0 : frame.scene.bands[k - 1]) && after == (k == 3 ? 0 : frame.scene.bands[k]);
 }
 
-// False where it can't be looked for.
-bool place_boundary(const Frame& frame, const Neighbourhood& generatrices, std::size_t k,
-                    const std::array<double, 4>& along_m, double slope_m, const Effort& effort, const BlurEllipse& blur,
-                    BoundaryPlace& place) {
-  const Generatrix& generatrix = generatrices.middle;
+// Nullopt where it can't be looked for.
+std::optional<BoundaryPlace> place_boundary(const Frame& frame, const Neighbourhood& generatrices, std::size_t k,
+                                            const std::array<double, 4>& along_m, double slope_m, const Effort& effort,
+                                            const BlurEllipse& blur) {
+  BoundaryPlace place{};
+  const Generatrix& generatrix = generatrices[1];
   place.facing = frame.facing(k, generatrix, along_m[k]);
   place.film_shift = place.shows_film() ? film_edge_level(place.facing, film_edge_limits.usual_even_light) : 0;
   const double depth_m = place.film_shift * frame.film_m;
   const Eigen::Vector3d point = frame.point(generatrix, along_m[k]) - depth_m * generatrix.outwards;
-  if (!frame.scene.field.contains(point)) return false;
+  if (!frame.scene.field.contains(point)) return std::nullopt;
   const ProjectionWithJacobian image = frame.scene.camera.raw_with_jacobian(point);
   const Eigen::Vector2d axis_px = image.d_px_d_point * frame.axes.col(2);
   const double px_per_m = axis_px.norm();
@@ -172,21 +161,20 @@ bool place_boundary(const Frame& frame, const Neighbourhood& generatrices, std::
   const Eigen::Vector2d normal(-tangent.y(), tangent.x());
   place.normal = {normal.dot(place.along), normal.dot(Eigen::Vector2d(-place.along.y(), place.along.x()))};
   const double cosine = std::abs(place.normal.x());
-  if (!(cosine > edge_limits.min_normal_cosine)) return false;
+  if (!(cosine > edge_limits.min_normal_cosine)) return std::nullopt;
   place.moved_by_blur_px =
       moved_by_blur_px(course_of(frame, generatrices, along_m[k], slope_m, depth_m, image.point_px, place.along), blur);
-  if (!std::isfinite(place.moved_by_blur_px)) return false;  // seen along the axis
+  if (!std::isfinite(place.moved_by_blur_px)) return std::nullopt;  // seen along the axis
 
-  double gap_px = HUGE_VAL;
-  if (k > 0) gap_px = std::min(gap_px, (along_m[k] - along_m[k - 1]) * px_per_m);
-  if (k < 3) gap_px = std::min(gap_px, (along_m[k + 1] - along_m[k]) * px_per_m);
-  const double own_px = 0.6 * gap_px;  // where it shows alone
+  const double before_m = k > 0 ? along_m[k] - along_m[k - 1] : HUGE_VAL;
+  const double after_m = k < 3 ? along_m[k + 1] - along_m[k] : HUGE_VAL;
+  const double own_px = 0.6 * (std::min(before_m, after_m) * px_per_m);  // where it shows alone
   const double blur_px = blur.along_normal_px(place.normal), line_blur_px = blur_px / cosine;
   const int reach = static_cast<int>(
       std::min({edge_limits.blur_reach * line_blur_px + effort.extra_px, own_px - line_blur_px, 22.0}));
-  if (reach < 3) return false;
-  const auto line = frame.edge_line(image.point_px, place.along, reach, reach, line_blur_px);
-  if (!line) return false;
+  if (reach < 3) return std::nullopt;
+  const auto line = frame.edge_line(generatrix, along_m[k], image.point_px, place.along, reach, reach, line_blur_px);
+  if (!line) return std::nullopt;
   place.line = *line;
   const Eigen::Vector3d pull = image.d_px_d_point.transpose() * normal;
   place.film_px_per_m = -pull.dot(generatrix.outwards);
@@ -199,7 +187,7 @@ bool place_boundary(const Frame& frame, const Neighbourhood& generatrices, std::
   place.measurement.expected_px = image.point_px.cast<float>();
   place.measurement.normal = normal.cast<float>();
   place.measurement.clear_px = static_cast<float>(own_px * cosine - blur_px);
-  return true;
+  return place;
 }
 
 float dot(const std::array<float, 3>& a, const std::array<float, 3>& b) {
@@ -209,27 +197,25 @@ float dot(const std::array<float, 3>& a, const std::array<float, 3>& b) {
 // The sum of the steps at a boundary, and the points that were located there; of an end, that show the film.
 struct LocatedSteps {
   std::array<float, 3> sum{};
-  InplaceVector<std::size_t, max_lines> points;
+  InplaceVector<BoundaryPlace*, max_lines> points;
 
-  LocatedSteps(std::size_t k, std::span<const BoundaryPlace> places, std::span<const EdgeFit> edges) {
-    for (std::size_t i = 0; i < places.size(); ++i) {
-      if (places[i].measurement.group != k || !edges[i].converged) continue;
-      if ((k == 0 || k == 3) && !places[i].shows_film()) continue;
-      points.push_back(i);
-      for (std::size_t c = 0; c < 3; ++c) sum[c] += edges[i].step[c];
+  LocatedSteps(std::size_t k, std::span<BoundaryPlace> places) {
+    for (BoundaryPlace& place : places) {
+      if (place.measurement.group != k || !place.edge.converged) continue;
+      if ((k == 0 || k == 3) && !place.shows_film()) continue;
+      points.push_back(&place);
+      for (std::size_t c = 0; c < 3; ++c) sum[c] += place.edge.step[c];
     }
   }
 };
 
-double even_light_in(std::span<const BoundaryPlace> places, std::span<const EdgeFit> edges) {
+double even_light_in(std::span<BoundaryPlace> places) {
   InplaceVector<EvenLight, 2> seen;
   for (const std::size_t k : {1U, 2U}) {
-    const LocatedSteps steps(k, places, edges);
+    const LocatedSteps steps(k, places);
     InplaceVector<FadingPoint, max_lines> points;
-    for (std::size_t at = 0; at < steps.points.size(); at += 2) {  // half of them suffice
-      const std::size_t i = steps.points[at];
-      points.push_back({places[i].facing.outside, dot(edges[i].step, steps.sum)});
-    }
+    for (std::size_t i = 0; i < steps.points.size(); i += 2)  // half of them suffice
+      points.push_back({steps.points[i]->facing.outside, dot(steps.points[i]->edge.step, steps.sum)});
     seen.push_back(even_light_of(points));
   }
   return usual_or_seen(seen);
@@ -237,20 +223,20 @@ double even_light_in(std::span<const BoundaryPlace> places, std::span<const Edge
 
 // Measures from the located points of an end how far the film's edge, where it shows, moves them.
 void see_film(const Frame& frame, std::size_t k, double even_light, const EdgeBlur& blur,
-              std::span<BoundaryPlace> places, std::span<const EdgeFit> edges) {
-  const LocatedSteps steps(k, places, edges);
+              std::span<BoundaryPlace> places) {
+  const LocatedSteps steps(k, places);
   if (steps.points.size() < edge_limits.min_alike) return;
   InplaceVector<EndPoint, max_lines> points;
-  for (const std::size_t i : steps.points) {
-    const float before = dot(edges[i].before, steps.sum), step = dot(edges[i].step, steps.sum);
+  for (const BoundaryPlace* place : steps.points) {
+    const float before = dot(place->edge.before, steps.sum), step = dot(place->edge.step, steps.sum);
     points.push_back(k == 0 ? EndPoint{before, step} : EndPoint{-before - step, step});
   }
   const auto gloss = gloss_of(points);
-  for (std::size_t at = 0; at < points.size(); ++at) {
-    BoundaryPlace& place = places[steps.points[at]];
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    BoundaryPlace& place = *steps.points[i];
     const double matt = film_edge_level(place.facing, even_light);
     const double width_px = frame.film_m * place.film_px_per_m, blur_px = blur.along_px[k];
-    const FilmShift shift = film_shift(matt - gloss.begin()[at], std::abs(width_px) / blur_px);
+    const FilmShift shift = film_shift(matt - gloss[i], std::abs(width_px) / blur_px);
     const double shift_px = shift.fraction * width_px;
     Measurement& m = place.measurement;
     m.row[film_unknown] += (shift.by_width - place.film_shift) * film_sigma_m * place.film_px_per_m;
@@ -262,44 +248,43 @@ void see_film(const Frame& frame, std::size_t k, double even_light, const EdgeBl
   }
 }
 
-struct Candidate {
-  const BoundaryPlace* place;
-  const EdgeFit* edge;
-  bool colours_agree;
-};
-
-// Keeps the candidates of one boundary whose change of light is what most see where the colours agree; gives each its
-// sigma from the noise that the lines show.
-void trust(std::span<const Candidate> candidates, const EdgeBlur& blur, EdgeMeasurements& out) {
-  std::array<float, 3> typical{};
-  InplaceVector<float, max_lines> values;
-  for (std::size_t c = 0; c < 3; ++c) {
-    values.clear();
-    for (const Candidate& candidate : candidates)
-      if (candidate.colours_agree) values.push_back(candidate.edge->step[c]);
-    if (values.size() < edge_limits.min_alike) return;
-    typical[c] = median(values);
+// Keeps the points of one boundary whose change of light is what most see where the colours agree; gives each its sigma
+// from the noise that the lines show.
+void trust(const Frame& frame, std::size_t k, std::span<const BoundaryPlace> places, const EdgeBlur& blur,
+           EdgeMeasurements& out) {
+  InplaceVector<const BoundaryPlace*, max_lines> located;
+  InplaceVector<const EdgeFit*, max_lines> agreeing;
+  for (const BoundaryPlace& place : places) {
+    if (place.measurement.group != k || !place.edge.converged) continue;
+    located.push_back(&place);
+    if (colours_agree(frame, place)) agreeing.push_back(&place.edge);
   }
-  values.clear();
-  for (const Candidate& candidate : candidates)
-    if (candidate.colours_agree) values.push_back(candidate.edge->residual_variance);
-  const double typical_variance = median(values);
+  if (agreeing.size() < edge_limits.min_alike) return;
+  const auto median_of = [&](const auto& value_of) {
+    InplaceVector<float, max_lines> values;
+    for (const EdgeFit* edge : agreeing) values.push_back(value_of(*edge));
+    return median(values);
+  };
+  std::array<float, 3> typical;
+  for (std::size_t c = 0; c < 3; ++c) typical[c] = median_of([c](const EdgeFit& edge) { return edge.step[c]; });
+  const double typical_variance = median_of([](const EdgeFit& edge) { return edge.residual_variance; });
   const float typical_square = dot(typical, typical);
-  for (const auto& [place, edge, agree] : candidates) {
-    const float projection = dot(edge->step, typical), square = dot(edge->step, edge->step);
+  for (const BoundaryPlace* place : located) {
+    const EdgeFit& edge = place->edge;
+    const float projection = dot(edge.step, typical), square = dot(edge.step, edge.step);
     const bool alike = projection > edge_limits.min_step * typical_square &&
                        projection * projection > edge_limits.least_alike * square * typical_square;
     const int max_variances = edge_limits.max_residual_sigmas * edge_limits.max_residual_sigmas;
-    if (!alike || edge->residual_variance > edge_limits.max_residual * square + max_variances * typical_variance)
+    if (!alike || edge.residual_variance > edge_limits.max_residual * square + max_variances * typical_variance)
       continue;
-    const double variance = 0.5 * (edge->residual_variance + typical_variance) * edge_limits.interpolation_noise;
+    const double variance = 0.5 * (edge.residual_variance + typical_variance) * edge_limits.interpolation_noise;
     const double cosine = place->normal.x();
     Measurement& measurement = out.all.emplace_back() = place->measurement;
     const double moved_px = place->moved_by_blur_px * cosine;
     measurement.expected_px += static_cast<float>(moved_px) * measurement.normal;
-    measurement.residual_px = edge->offset_px * cosine - moved_px - place->film_moved_px;
-    out.ellipse.add(*edge, variance, blur, measurement.group, place->normal);
-    measurement.sigma_px = std::sqrt(variance / edge->information * cosine * cosine +
+    measurement.residual_px = edge.offset_px * cosine - moved_px - place->film_moved_px;
+    out.ellipse.add(edge, variance, blur, k, place->normal);
+    measurement.sigma_px = std::sqrt(variance / edge.information * cosine * cosine +
                                      edge_limits.single_floor_px * edge_limits.single_floor_px +
                                      place->film_sigma_px * place->film_sigma_px);
   }
@@ -321,35 +306,26 @@ void measure_boundaries(const Frame& frame, const Effort& effort, const EdgeBlur
   InplaceVector<EdgeLine, 4 * max_lines> lines;
   for (int i = 0; i < out.lines; ++i) {
     const double sine = reach * (2.0 * (i + 0.5) / out.lines - 1) * sine_of_half;
-    const Neighbourhood generatrices(frame, frame.view.facing_azimuth_rad + std::asin(sine));
-    const double tau_rad = frame.tau(generatrices.middle.azimuth_rad);
+    const Neighbourhood generatrices = frame.neighbourhood(frame.view.facing_azimuth_rad + std::asin(sine));
+    const double tau_rad = frame.tau(generatrices[1].azimuth_rad);
     const auto along_m = boundaries_m(frame.marker(), tau_rad);
     const double seam_px = distance_to_seam_rad(frame.marker(), tau_rad) * radius_px * std::sqrt(1 - sine * sine);
     for (std::size_t k = 0; k < 4; ++k) {
       if (jumps[k] && seam_px < edge_limits.blur_reach * blur.along_px[k] + edge_limits.seam_px) continue;
-      BoundaryPlace& place = places.emplace_back();
-      if (!place_boundary(frame, generatrices, k, along_m, slopes_m[k], effort, ellipses[k], place) ||
-          lies_behind_another(frame, place.line, generatrices.middle, along_m[k])) {
-        places.pop_back();
-        continue;
-      }
+      auto place = place_boundary(frame, generatrices, k, along_m, slopes_m[k], effort, ellipses[k]);
+      if (!place) continue;
       ++out.in_image[k];
-      place.measurement.across = sine / sine_of_half;
-      lines.push_back(place.line);
+      place->measurement.across = sine / sine_of_half;
+      places.push_back(*place), lines.push_back(place->line);
     }
   }
   const EdgeFits edges = locate_edges(frame.light, lines, EdgeKind::step, effort.iterations);
+  for (std::size_t i = 0; i < places.size(); ++i) places[i].edge = edges[i];
   if (effort.thinning == 1) {
-    const double even_light = even_light_in(places, edges);
-    for (const std::size_t end : {0U, 3U}) see_film(frame, end, even_light, blur, places, edges);
+    const double even_light = even_light_in(places);
+    for (const std::size_t end : {0U, 3U}) see_film(frame, end, even_light, blur, places);
   }
-  for (std::size_t k = 0; k < 4; ++k) {
-    InplaceVector<Candidate, max_lines> candidates;
-    for (std::size_t i = 0; i < places.size(); ++i)
-      if (places[i].measurement.group == k && edges[i].converged)
-        candidates.push_back({&places[i], &edges[i], colours_agree(frame, places[i], edges[i].offset_px)});
-    trust(candidates, blur, out);
-  }
+  for (std::size_t k = 0; k < 4; ++k) trust(frame, k, places, blur, out);
 }
 
 // Whether one band fills the section between two azimuths at a place, with some room.
@@ -378,10 +354,15 @@ struct Side {
         group(sign < 0 ? 4 : 5) {}
 };
 
-// The line to look along for a point of a side, and that point where it is expected. Nullopt where it can't be looked
-// for.
-std::optional<EdgeLine> place_side(const Frame& frame, const Side& side, double along_m, const Effort& effort,
-                                   double blur_px, Measurement& measurement) {
+// A point of a side where it is expected, and the line to look along for it.
+struct SidePlace {
+  Measurement measurement;
+  EdgeLine line;
+};
+
+// Nullopt where it can't be looked for.
+std::optional<SidePlace> place_side(const Frame& frame, const Side& side, double along_m, const Effort& effort,
+                                    double blur_px) {
   const Eigen::Vector3d point = frame.point(side.contour, along_m);
   if (!frame.scene.field.contains(point)) return std::nullopt;
   const ProjectionWithJacobian image = frame.scene.camera.raw_with_jacobian(point);
@@ -397,14 +378,15 @@ std::optional<EdgeLine> place_side(const Frame& frame, const Side& side, double 
   if (inside < 3) return std::nullopt;
   const double room_m = reach_px * frame.marker().length_m() / 200;
   if (!one_band(frame, side.contour.azimuth_rad, side.deep.azimuth_rad, along_m, room_m)) return std::nullopt;
-  auto line = frame.edge_line(image.point_px, inwards, outside, inside, blur_px);
-  if (!line || lies_behind_another(frame, *line, side.contour, along_m)) return std::nullopt;
+  auto line = frame.edge_line(side.contour, along_m, image.point_px, inwards, outside, inside, blur_px);
+  if (!line) return std::nullopt;
   line->contour_radius_px = static_cast<float>(radius_px);
+  Measurement measurement{};
   measurement.row = frame.unknowns.row(point, image.d_px_d_point.transpose() * inwards);
   measurement.group = side.group;
   measurement.expected_px = image.point_px.cast<float>();
   measurement.normal = inwards.cast<float>();
-  return line;
+  return SidePlace{measurement, *line};
 }
 
 void measure_sides(const Frame& frame, const Effort& effort, double blur_px, EdgeMeasurements& out) {
@@ -415,10 +397,8 @@ void measure_sides(const Frame& frame, const Effort& effort, double blur_px, Edg
   for (int station = 0; station < count; ++station)
     for (const Side& side : sides) {
       const double along_m = frame.marker().length_m() * (station + 0.5) / count;
-      if (const auto line = place_side(frame, side, along_m, effort, blur_px, places.emplace_back()))
-        lines.push_back(*line);
-      else
-        places.pop_back();
+      if (const auto place = place_side(frame, side, along_m, effort, blur_px))
+        places.push_back(place->measurement), lines.push_back(place->line);
     }
   out.sides_in_image = static_cast<int>(places.size());
   const EdgeFits edges = locate_edges(frame.light, lines, EdgeKind::contour, effort.iterations);
@@ -442,12 +422,6 @@ void measure_sides(const Frame& frame, const Effort& effort, double blur_px, Edg
 }
 
 }  // namespace
-
-EdgeBlur EdgeMeasurements::improved(const EdgeBlur& blur) const {
-  EdgeBlur next = ellipse.improved(blur);
-  next.sides_px = side_blur.improved(blur.sides_px);
-  return next;
-}
 
 EdgeMeasurements measure_edges(const Scene& scene, const LightImage& light, const PoseUnknowns& unknowns, double film_m,
                                const Effort& effort, const EdgeBlur& blur) {

@@ -86,7 +86,11 @@ struct EdgeMeasurements {
   BlurEvidence side_blur;
 
   /// The blur that they were located with after a step.
-  EdgeBlur improved(const EdgeBlur& blur) const;
+  EdgeBlur improved(const EdgeBlur& blur) const {
+    EdgeBlur next = ellipse.improved(blur);
+    next.sides_px = side_blur.improved(blur.sides_px);
+    return next;
+  }
 };
 
 /// Looks around `unknowns` in linear light, to a fraction of a pixel. Nothing when the pose shows no shaft.

@@ -2,20 +2,22 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
 #include <Eigen/Cholesky>
 
+#include "lapservo/core/inplace_vector.h"
 #include "lapservo/vision/edges/blurred_edges.h"
 
 namespace lapservo::internal {
 namespace {
 
-// At every sample: the model's linear basis (a constant, then `Shapes`), and the shapes' derivatives by the edge's
+// At every sample: the model's linear basis, a constant and then `Shapes`; and the shapes' derivatives by the edge's
 // position and by the blur.
 template <int Shapes>
 struct Basis {
-  std::array<std::array<float, EdgeProfile::max_samples>, Shapes> value, by_position, by_blur;
+  using Amplitudes = Eigen::Matrix<float, Shapes + 1, 1>;
+  std::array<Amplitudes, EdgeProfile::max_samples> row;
+  std::array<Eigen::Matrix<float, Shapes, 1>, EdgeProfile::max_samples> by_position, by_blur;
 };
 
 // One shape: a step. The second one: sqrt(1 - (1 - d/R)^2) = sqrt(2 d / R) (1 - d / 4R - ...), the occluding contour
@@ -28,58 +30,18 @@ Basis<Shapes> basis_at(const EdgeProfile& profile, float edge_px, float blur_px,
   for (std::size_t i = 0; i < profile.count; ++i) {
     const float u = (profile.first_px + static_cast<float>(i) - edge_px) / blur_px;
     const BlurredEdge edge = edges.at(u);
-    basis.value[0][i] = edge.step;
-    basis.by_position[0][i] = -edge.density / blur_px;
-    basis.by_blur[0][i] = -edge.density * u / blur_px;
+    basis.row[i][0] = 1;
+    basis.row[i][1] = edge.step;
+    basis.by_position[i][0] = -edge.density / blur_px;
+    basis.by_blur[i][0] = -edge.density * u / blur_px;
     if constexpr (Shapes == 2) {
-      basis.value[1][i] = scale * root_blur * (edge.root - blur_px * edge.three_halves / (4 * radius_px));
-      basis.by_position[1][i] =
+      basis.row[i][2] = scale * root_blur * (edge.root - blur_px * edge.three_halves / (4 * radius_px));
+      basis.by_position[i][1] =
           -scale / root_blur * (edge.root_slope - blur_px * (3.0F / 2) * edge.root / (4 * radius_px));
-      basis.by_blur[1][i] = scale / root_blur * (0.5F * edge.root - u * edge.root_slope);
+      basis.by_blur[i][1] = scale / root_blur * (0.5F * edge.root - u * edge.root_slope);
     }
   }
   return basis;
-}
-
-template <int Shapes>
-using Amplitudes = Eigen::Matrix<float, Shapes + 1, 1>;  // of a constant and the shapes
-
-template <int Shapes>
-Amplitudes<Shapes> row_of(const Basis<Shapes>& basis, std::size_t sample) {
-  Amplitudes<Shapes> row;
-  row[0] = 1;
-  for (int s = 0; s < Shapes; ++s) row[s + 1] = basis.value[static_cast<std::size_t>(s)][sample];
-  return row;
-}
-
-// The amplitudes that fit one channel best.
-template <int Shapes>
-struct ChannelFit {
-  Eigen::LDLT<Eigen::Matrix<float, Shapes + 1, Shapes + 1>> solver;
-  Amplitudes<Shapes> amplitude;
-  int used = 0;  // samples
-};
-
-// Nullopt where the channel has too few samples.
-template <int Shapes>
-std::optional<ChannelFit<Shapes>> fit_channel(const EdgeProfile& profile, const Basis<Shapes>& basis, std::size_t c) {
-  constexpr int more_than_unknowns = 4;
-  Eigen::Matrix<float, Shapes + 1, Shapes + 1> normal;
-  normal.setZero();
-  Amplitudes<Shapes> light_sum = Amplitudes<Shapes>::Zero();
-  ChannelFit<Shapes> channel;
-  for (std::size_t i = 0; i < profile.count; ++i) {
-    if (!profile.usable[c][i]) continue;
-    const Amplitudes<Shapes> row = row_of(basis, i);
-    normal.noalias() += row * row.transpose();
-    light_sum.noalias() += profile.light[c][i] * row;
-    ++channel.used;
-  }
-  if (channel.used < Shapes + 1 + more_than_unknowns) return std::nullopt;
-  normal.diagonal().array() += 1e-5F;
-  channel.solver.compute(normal);
-  channel.amplitude = channel.solver.solve(light_sum);
-  return channel;
 }
 
 // Sums over the channels, of what their amplitudes can't imitate.
@@ -88,30 +50,40 @@ struct PositionSums {
   int degrees = -1;
 };
 
+// With the amplitudes that fit the channel best; nothing where it has too few samples.
 template <int Shapes>
-void add_channel(const EdgeProfile& profile, const Basis<Shapes>& basis, std::size_t c,
-                 const ChannelFit<Shapes>& channel, EdgeFit& fit, PositionSums& sums) {
+void add_channel(const EdgeProfile& profile, const Basis<Shapes>& basis, std::size_t c, EdgeFit& fit,
+                 PositionSums& sums) {
+  using Amplitudes = typename Basis<Shapes>::Amplitudes;
+  using Normal = Eigen::Matrix<float, Shapes + 1, Shapes + 1>;
+  constexpr int unknowns = Shapes + 1, more_than_unknowns = 4;
+  InplaceVector<std::size_t, EdgeProfile::max_samples> used;
+  Normal normal = Normal::Zero();
+  Amplitudes light_sum = Amplitudes::Zero();
+  for (std::size_t i = 0; i < profile.count; ++i) {
+    if (!profile.usable[c][i]) continue;
+    used.push_back(i);
+    normal.noalias() += basis.row[i] * basis.row[i].transpose();
+    light_sum.noalias() += profile.light[c][i] * basis.row[i];
+  }
+  const int samples = static_cast<int>(used.size());
+  if (samples < unknowns + more_than_unknowns) return;
+  normal.diagonal().array() += 1e-5F;
+  const Eigen::LDLT<Normal> solver(normal);
+  const Amplitudes amplitude = solver.solve(light_sum);
   // Derivatives of the model.
   std::array<float, EdgeProfile::max_samples> position, blur, miss;
-  Amplitudes<Shapes> position_sum = Amplitudes<Shapes>::Zero(), blur_sum = Amplitudes<Shapes>::Zero();
-  for (std::size_t i = 0; i < profile.count; ++i) {
-    if (!profile.usable[c][i]) continue;
-    const Amplitudes<Shapes> row = row_of(basis, i);
-    position[i] = blur[i] = 0;
-    for (int s = 0; s < Shapes; ++s) {
-      position[i] += channel.amplitude[s + 1] * basis.by_position[static_cast<std::size_t>(s)][i];
-      blur[i] += channel.amplitude[s + 1] * basis.by_blur[static_cast<std::size_t>(s)][i];
-    }
-    miss[i] = profile.light[c][i] - channel.amplitude.dot(row);
-    position_sum += position[i] * row;
-    blur_sum += blur[i] * row;
+  Amplitudes position_sum = Amplitudes::Zero(), blur_sum = Amplitudes::Zero();
+  for (const std::size_t i : used) {
+    position[i] = amplitude.template tail<Shapes>().dot(basis.by_position[i]);
+    blur[i] = amplitude.template tail<Shapes>().dot(basis.by_blur[i]);
+    miss[i] = profile.light[c][i] - amplitude.dot(basis.row[i]);
+    position_sum += position[i] * basis.row[i];
+    blur_sum += blur[i] * basis.row[i];
   }
-  const Amplitudes<Shapes> position_part = channel.solver.solve(position_sum),
-                           blur_part = channel.solver.solve(blur_sum);
-  for (std::size_t i = 0; i < profile.count; ++i) {
-    if (!profile.usable[c][i]) continue;
-    const Amplitudes<Shapes> row = row_of(basis, i);
-    const float p = position[i] - position_part.dot(row), b = blur[i] - blur_part.dot(row);
+  const Amplitudes position_part = solver.solve(position_sum), blur_part = solver.solve(blur_sum);
+  for (const std::size_t i : used) {
+    const float p = position[i] - position_part.dot(basis.row[i]), b = blur[i] - blur_part.dot(basis.row[i]);
     sums.position_gradient += p * miss[i];
     fit.information += p * p;
     fit.blur_gradient += b * miss[i];
@@ -119,9 +91,9 @@ void add_channel(const EdgeProfile& profile, const Basis<Shapes>& basis, std::si
     sums.position_and_blur += p * b;
     sums.squares += miss[i] * miss[i];
   }
-  sums.degrees += channel.used - (Shapes + 1);
-  fit.step[c] = channel.amplitude.template tail<Shapes>().sum();
-  fit.before[c] = channel.amplitude[0];
+  sums.degrees += samples - unknowns;
+  fit.step[c] = amplitude.template tail<Shapes>().sum();
+  fit.before[c] = amplitude[0];
 }
 
 // One variable-projection step: linear amplitudes per channel, then the position in what they leave.
@@ -129,8 +101,7 @@ template <int Shapes>
 EdgeFit project(const EdgeProfile& profile, const Basis<Shapes>& basis) {
   EdgeFit fit;
   PositionSums sums;
-  for (std::size_t c = 0; c < 3; ++c)
-    if (const auto channel = fit_channel(profile, basis, c)) add_channel(profile, basis, c, *channel, fit, sums);
+  for (std::size_t c = 0; c < 3; ++c) add_channel(profile, basis, c, fit, sums);
   if (sums.degrees < 3 || !(fit.information > min_edge_information)) return fit;
   fit.offset_px = sums.position_gradient / fit.information;
   // For the blur, whatever the position is.

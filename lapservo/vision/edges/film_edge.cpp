@@ -13,8 +13,6 @@ namespace {
 struct FadingLine {
   double at_zero = 0, slope = 0, variance = std::numeric_limits<double>::infinity();
   double count = 0, mean_square_lever = 0;  // of at_zero's error
-
-  double off(const FadingPoint& p) const { return p.step - at_zero - slope * p.outside_facing; }
 };
 
 // For the points that the line before has as inliers.
@@ -23,7 +21,7 @@ FadingLine fading_line(std::span<const FadingPoint> points, const FadingLine& be
   double x = 0, y = 0, xx = 0, xy = 0, yy = 0;
   FadingLine line;
   for (const FadingPoint& p : points) {
-    const double off = before.off(p);
+    const double off = p.step - before.at_zero - before.slope * p.outside_facing;
     if (off * off > inlier_sigmas * inlier_sigmas * before.variance) continue;
     line.count += 1;
     x += p.outside_facing, y += p.step;

@@ -13,14 +13,9 @@
 
 namespace lapservo::internal {
 
-/// Pixels u_begin <= u < u_end, v_begin <= v < v_end.
-struct PixelBox {
-  int u_begin = 0, v_begin = 0, u_end = 0, v_end = 0;
-};
-
 /// Whether two fields are woven in the box that saw something in two places, some pixels apart. Looks at some thousand
 /// pixels, and at all only where those look like fields. Allocates nothing.
-bool is_combed(const ImageView& image, const PixelBox& box);
+bool is_combed(const ImageView& image, const cv::Rect& box);
 
 /// Whether it is so about what was found, or refused, as the marker; false where nothing was.
 bool is_combed(const ImageView& image, const Camera& camera, const Marker& marker, const Observation& observation);

@@ -82,14 +82,10 @@ TEST(Interlacing, OneFieldTellsItsMoment) {
 
 TEST(Interlacing, NoiseBlurAndDarknessAreNoFields) {
   const Rig rig = scenes::usual_rig();
-  RenderOptions noisy, blurred, sharp, dark;
-  noisy.sensor.read_noise *= 4;
-  blurred.sensor.blur_px = 2.2;
-  sharp.sensor.blur_px = 0.3;
-  dark.sensor.gains = Light::Constant(0.15F);
-  for (const RenderOptions& options : {RenderOptions{}, noisy, blurred, sharp, dark})
+  for (const Sensor& sensor : {Sensor{}, Sensor{.read_noise = 4 * Sensor{}.read_noise}, Sensor{.blur_px = 2.2},
+                               Sensor{.blur_px = 0.3}, Sensor{.gains = Light::Constant(0.15F)}})
     for (std::uint64_t seed = 1; seed <= 4; ++seed) {
-      const scenes::Shot shot(seed, options);
+      const scenes::Shot shot(seed, {.lighting = {}, .sensor = sensor});
       EXPECT_EQ(Tracker(rig).track(shot.bgr)[0].status, Status::ok) << "seed " << seed;
     }
 }
@@ -102,18 +98,17 @@ TEST(Interlacing, AChessboardOfPixelsIsNoFields) {
       board.at<cv::Vec3b>(v, u) = cv::Vec3b::all((u + v) % 2 ? 200 : 40);
       stripes.at<cv::Vec3b>(v, u) = cv::Vec3b::all(v % 2 ? 200 : 40);
     }
-  const PixelBox all{0, 0, 80, 60};
+  const cv::Rect all(0, 0, 80, 60);
   EXPECT_FALSE(is_combed(ImageView(board), all));
   EXPECT_TRUE(is_combed(ImageView(stripes), all));
-  EXPECT_FALSE(is_combed(ImageView(stripes), {0, 0, 3, 3}));
-  EXPECT_FALSE(is_combed(ImageView(stripes), {79, 59, 80, 60}));
+  EXPECT_FALSE(is_combed(ImageView(stripes), cv::Rect(0, 0, 3, 3)));
+  EXPECT_FALSE(is_combed(ImageView(stripes), cv::Rect(79, 59, 1, 1)));
 }
 
 TEST(Interlacing, TheEvenFieldKeepsItsRowsAndInterpolatesLight) {
   cv::Mat frame(5, 2, CV_8UC3);
   for (int v = 0; v < frame.rows; ++v) frame.row(v) = cv::Scalar::all(v == 2 ? 255 : v % 2 ? 77 : 0);
-  Response linear;
-  linear.kind = Response::Kind::power, linear.gamma = 1;
+  const Response linear{Response::Kind::power, 1};
   EvenField field(linear);
   const cv::Mat& even = field.of(frame);
   ASSERT_EQ(even.size(), frame.size());

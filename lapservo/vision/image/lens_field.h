@@ -6,7 +6,6 @@
 
 #include "lapservo/geometry/camera.h"
 #include "lapservo/geometry/field_of_view.h"
-#include "lapservo/geometry/invertible.h"
 
 namespace lapservo::internal {
 

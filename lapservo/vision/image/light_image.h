@@ -34,6 +34,15 @@ struct ChannelGeometry {
     reach_px = corner_px * std::max(std::abs(magnification[0] - 1), std::abs(magnification[2] - 1));
   }
   bool differs() const { return reach_px > 0; }
+  /// Calls `read<First, Last>(u, v)` for channels First to Last, where the image shows them of green's place.
+  template <typename Read>
+  void for_each_place(float u, float v, const Read& read) const {
+    if (!differs()) return read.template operator()<0, 3>(u, v);
+    const auto place = [&](std::size_t c, float centre, float x) { return centre + magnification[c] * (x - centre); };
+    read.template operator()<0, 1>(place(0, centre_u, u), place(0, centre_v, v));
+    read.template operator()<1, 2>(u, v);
+    read.template operator()<2, 3>(place(2, centre_u, u), place(2, centre_v, v));
+  }
 };
 
 /// A frame in linear light, decoded where it is looked at. Optical blur acts on light, so edges are located in it.
@@ -58,16 +67,20 @@ class LightImage {
   /// Bilinear; contains() the point.
   Sample at(float u, float v) const {
     Sample sample;
-    if (!channels_.differs()) {
-      read<0, 3>(u, v, sample);
-      return sample;
-    }
-    const auto place = [&](std::size_t c, float centre, float x) {
-      return centre + channels_.magnification[c] * (x - centre);
-    };
-    read<0, 1>(place(0, channels_.centre_u, u), place(0, channels_.centre_v, v), sample);
-    read<1, 2>(u, v, sample);
-    read<2, 3>(place(2, channels_.centre_u, u), place(2, channels_.centre_v, v), sample);
+    channels_.for_each_place(u, v, [&]<std::size_t First, std::size_t Last>(float at_u, float at_v) {
+      const int iu = static_cast<int>(at_u), iv = static_cast<int>(at_v);
+      const float fu = at_u - static_cast<float>(iu), fv = at_v - static_cast<float>(iv);
+      const std::uint8_t* top = image_->pixel(iu, iv);
+      const std::uint8_t* bottom = top + image_->row_bytes;
+      const LightTable& light = *light_;
+      const float w00 = (1 - fu) * (1 - fv), w01 = fu * (1 - fv), w10 = (1 - fu) * fv, w11 = fu * fv;
+      for (std::size_t c = First; c < Last; ++c) {
+        sample.light[c] =
+            w00 * light[top[c]] + w01 * light[top[c + 3]] + w10 * light[bottom[c]] + w11 * light[bottom[c + 3]];
+        sample.saturated[c] = (top[c] >= saturated_value) | (top[c + 3] >= saturated_value) |
+                              (bottom[c] >= saturated_value) | (bottom[c + 3] >= saturated_value);
+      }
+    });
     return sample;
   }
   /// Whether at() can sample there. A place that rounds onto the last pixel in single precision counts as outside.
@@ -80,23 +93,6 @@ class LightImage {
   }
 
  private:
-  // Channels First to Last at one place.
-  template <std::size_t First, std::size_t Last>
-  void read(float u, float v, Sample& sample) const {
-    const int iu = static_cast<int>(u), iv = static_cast<int>(v);
-    const float fu = u - static_cast<float>(iu), fv = v - static_cast<float>(iv);
-    const std::uint8_t* top = image_->pixel(iu, iv);
-    const std::uint8_t* bottom = top + image_->row_bytes;
-    const LightTable& light = *light_;
-    const float w00 = (1 - fu) * (1 - fv), w01 = fu * (1 - fv), w10 = (1 - fu) * fv, w11 = fu * fv;
-    for (std::size_t c = First; c < Last; ++c) {
-      sample.light[c] =
-          w00 * light[top[c]] + w01 * light[top[c + 3]] + w10 * light[bottom[c]] + w11 * light[bottom[c + 3]];
-      sample.saturated[c] = (top[c] >= saturated_value) | (top[c + 3] >= saturated_value) |
-                            (bottom[c] >= saturated_value) | (bottom[c + 3] >= saturated_value);
-    }
-  }
-
   const ImageView* image_;
   const LightTable* light_;
   ChannelGeometry channels_;

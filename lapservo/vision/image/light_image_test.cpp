@@ -45,9 +45,8 @@ TEST(LightImage, ReadsEachChannelWhereItsImageLies) {
   const cv::Mat image = random_image(5, 60, 50, 255);
   const ImageView view(image);
   const auto table = Response{}.table();
-  Camera camera;
-  camera.width_px = 60, camera.height_px = 50, camera.cx_px = 31, camera.cy_px = 22;
-  camera.chromatic_aberration = {0.985, 1.01};
+  const Camera camera{
+      .width_px = 60, .height_px = 50, .cx_px = 31, .cy_px = 22, .response = {}, .chromatic_aberration = {0.985, 1.01}};
   const LightImage plain(view, table), light(view, table, ChannelGeometry(camera));
   Random random(6);
   int tried = 0;

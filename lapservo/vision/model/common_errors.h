@@ -3,15 +3,34 @@
 #include <algorithm>
 #include <array>
 #include <optional>
+#include <span>
 
+#include <Eigen/Core>
+
+#include "lapservo/geometry/camera.h"
+#include "lapservo/marker/marker.h"
 #include "lapservo/vision/camera/picture_processing.h"
 #include "lapservo/vision/edges/edge_blur.h"
 #include "lapservo/vision/edges/edge_measurements.h"
-#include "lapservo/vision/model/print_doubt.h"
-#include "lapservo/vision/model/residual_lines.h"
-#include "lapservo/vision/model/rig_errors.h"
+#include "lapservo/vision/model/print_evidence.h"
+#include "lapservo/vision/shaft/shaft_pose.h"
 
 namespace lapservo::internal {
+
+/// A group's residuals as a straight line over the print: of boundaries in metres along the shaft, of sides a constant
+/// in pixels. Zero where a group has too few points for one of its own.
+struct ResidualLine {
+  double at_start = 0, slope = 0;  ///< at tau = 0; a turn
+
+  /// The rest of a residual after the line.
+  double residual_px(const Measurement& m) const;
+};
+using ResidualLines = std::array<ResidualLine, measurement_groups>;
+
+ResidualLines residual_lines(std::span<const Measurement> measurements);
+
+/// Root mean square of the boundaries' residuals in sigmas, each about its own line; outliers do not count.
+double scatter_sigmas(std::span<const Measurement> measurements, const ResidualLines& lines);
 
 /// How large the errors are that measurements share, and what is uncertain in an image. Fractions are of pixels.
 struct UsualErrors {
@@ -56,9 +75,40 @@ struct UsualErrors {
 };
 inline constexpr UsualErrors usual_errors;
 
+/// How far one sigma of each number of the rig's camera, and of the marker's length, wrap, gap and diameter, moves
+/// measurements [px], to first order. Numbers count as independent of one another, but for the two focal lengths, a
+/// third of whose variance is common: a camera's mostly have all of it in common, but the rig does not say. The errors
+/// of a print's bands have most in common: they count as one of its length, beside what they leave of each boundary
+/// (Marker::boundary_sigma_m()).
+class RigErrors {
+ public:
+  static constexpr int of_marker = 4, most = 5 + 5 + 1 + of_marker;  ///< pinhole, distortion, response, marker
+  using Shifts = Eigen::Matrix<double, most, 1>;
+
+  RigErrors() = default;
+  /// `by_exponent_px`: how far a boundary moves with the exponent of the camera's response (moved_by_exponent_px()).
+  RigErrors(const Camera& camera, const Marker& marker, const ShaftPose& pose,
+            const std::array<double, 4>& by_exponent_px);
+
+  bool any() const { return camera_ != nullptr; }
+  /// Zero for numbers without a sigma.
+  Shifts of(const Measurement& measurement) const;
+
+ private:
+  const Camera* camera_ = nullptr;
+  std::array<double, 4> response_px_{};
+  /// How far length, wrap, gap and diameter move each boundary: at the print's upper edge, at its lower one.
+  std::array<std::array<Eigen::Vector2d, 4>, of_marker> along_m_{};
+  Eigen::Vector3d nearer_m_ = Eigen::Vector3d::Zero();  ///< by the diameter, in the unrolled frame's axes
+};
+
+/// Whether the camera or the marker has sigmas that move measurements alike.
+bool has_sigmas(const Camera& camera, const Marker& marker);
+
 /// Errors that all measurements of a group share (one sigma), by how much all noise is larger than each measurement
 /// says, and what is uncertain before the print is blamed.
 struct CommonErrors {
+  ResidualLines lines{};  ///< about which measurements scatter
   std::array<double, measurement_groups> px{};
   /// For all boundaries alike (rms): moved along the shaft, leaning from side to side, bowed.
   double whole_px = 0, leaning_px = 0, bowed_px = 0;
@@ -81,7 +131,7 @@ double doubt_scale(double sigma_px, double blur_px, double bias_px);
 /// The errors of each boundary and side as a whole, and the noise as it is. `bias_px`: by how much the camera's
 /// processing may have moved each boundary; of those that `processed` shows, it is corrected. `departure_px`: what is
 /// left of a departure from the rig's camera.
-CommonErrors common_errors(const EdgeMeasurements& pass, const ResidualLines& lines, const EdgeBlur& blur,
+CommonErrors common_errors(const EdgeMeasurements& pass, const EdgeBlur& blur,
                            const std::optional<ProcessedEdges>& processed, const std::array<double, 4>& bias_px,
                            const std::array<double, 4>& departure_px);
 

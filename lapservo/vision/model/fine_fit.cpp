@@ -8,7 +8,6 @@
 
 #include "lapservo/vision/model/common_errors.h"
 #include "lapservo/vision/model/normal_equations.h"
-#include "lapservo/vision/model/residual_lines.h"
 #include "lapservo/vision/model/turn_blur.h"
 
 namespace lapservo::internal {
@@ -78,7 +77,8 @@ class Fitter {
   }
   bool see_camera(const Expected& expected) {
     const bool is_blurred_otherwise =
-        expected.blur_px && std::abs(fit_.blur.boundaries_px() / *expected.blur_px - 1) > fine_fit_limits.other_blur;
+        expected.blur &&
+        std::abs(fit_.blur.boundaries_px() / expected.blur->boundaries_px() - 1) > fine_fit_limits.other_blur;
     fit_.asked = fit_.asked || expected.ask || is_blurred_otherwise;  // also after other passes
     for (int i = 0; fit_.asked; ++i) {
       const CameraDeparture departure = look_at_camera();
@@ -95,14 +95,13 @@ class Fitter {
     fit_.lines = pass_.lines;
     fit_.in_image = pass_.in_image;
     fit_.sides_in_image = pass_.sides_in_image;
-    const ResidualLines lines = residual_lines(pass_.all);
     const auto tau_rad = facing_tau_rad(scene_.marker, fit_.unknowns.pose());
     const bool is_known = tau_rad && scene_.known_sides[print_side(*tau_rad)];
     count_inliers();
     std::optional<RcmBesideFit> beside;
     if (const auto measurement = rcm())
       beside = RcmBesideFit{*measurement, fit_.unknowns.through_rcm(), fit_.is_well_seen()};
-    const auto print = fit_print(pass_.all, lines, beside, film_prior(), scene_.marker, is_known, errors_of(lines));
+    const auto print = fit_print(pass_.all, beside, film_prior(), scene_.marker, is_known, errors());
     if (!print) return;
     settled_ = fit_.unknowns;
     fit_.unknowns = fit_.unknowns.with_rcm(print->through_rcm);
@@ -177,8 +176,8 @@ class Fitter {
     }
     return settled;
   }
-  ProcessingEvidence processing_in(const LightImage& light, const PooledEdges& glance) {
-    ProcessingEvidence evidence = find_processing(light, pass_.all, glance, located_with_.boundaries_px());
+  ProcessingEvidence processing_in(const LightImage& light) {
+    ProcessingEvidence evidence = find_processing(light, pass_.all, located_with_.boundaries_px());
     fit_.processing_explained += evidence.explained;
     return evidence;
   }
@@ -190,21 +189,20 @@ class Fitter {
     fit_.processing = Processing::unknown, processed_.reset();
     if (located_with_.boundaries_px() > processing_limits.max_blur_px) return known;
     const DepartedLight seen(light_, known);
-    const PooledEdges glance = glance_at(seen.light(), pass_.all);
-    ProcessingEvidence evidence = processing_in(seen.light(), glance);
+    ProcessingEvidence evidence = processing_in(seen.light());
     fit_.processing = evidence.processing;
-    const bool is_withdrawn = fit_.processing != Processing::none && known.any() &&
-                              looks_better(processing_in(light_, glance_at(light_, pass_.all)), evidence);
+    const bool is_withdrawn =
+        fit_.processing != Processing::none && known.any() && looks_better(processing_in(light_), evidence);
     processed_ = std::move(evidence.edges);
     if (is_withdrawn) return {};
     if (fit_.processing == Processing::found) return known;
     ++fit_.asked_for_departure;
-    const auto more = find_departure(seen.light(), pass_.all, glance, located_with_.boundaries_px());
+    const auto more = find_departure(seen.light(), pass_.all, located_with_.boundaries_px());
     if (!more) return known.any() ? known : CameraDeparture{};  // what was uncertain is certain, where channels agree
     const auto all = known.then(*more);
     if (!all || !more->any()) return all.value_or(known);
     const DepartedLight without(light_, *all);
-    const auto left = processing_in(without.light(), glance_at(without.light(), pass_.all));
+    const auto left = processing_in(without.light());
     return left.processing == Processing::none ? *all : known;
   }
   void take_processing_off(const ProcessedEdges& edges) {
@@ -220,8 +218,8 @@ class Fitter {
     fit_.covariance(psi_unknown, psi_unknown) += variance_of_uneven_turn(turn, change_rad);
     fit_.p_false = std::max(fit_.p_false, p_false_of(0, fit_.psi_variance_rad2()));
   }
-  CommonErrors errors_of(const ResidualLines& lines) const {
-    CommonErrors errors = common_errors(pass_, lines, fit_.blur, processed_, fit_.bias_px, departure_px());
+  CommonErrors errors() const {
+    CommonErrors errors = common_errors(pass_, fit_.blur, processed_, fit_.bias_px, departure_px());
     if (!has_sigmas(scene_.camera, scene_.marker)) return errors;
     std::array<double, 4> by_exponent_px{};
     // An exponent that the image shows has a sigma of its own.
@@ -248,13 +246,13 @@ class Fitter {
   void count_inliers() {
     fit_.used.fill(0), fit_.sides_used = 0;
     double squares = 0;
-    int inliers = 0;
     for (const Measurement& m : pass_.all) {
       const double sigmas = std::abs(m.residual_px) / std::hypot(m.sigma_px, fine_fit_limits.tolerated_px);
       if (sigmas > inlier_sigmas) continue;
       m.group < 4 ? ++fit_.used[m.group] : ++fit_.sides_used;
-      if (m.group < 4) squares += sigmas * sigmas, ++inliers;
+      if (m.group < 4) squares += sigmas * sigmas;
     }
+    const int inliers = fit_.used[0] + fit_.used[1] + fit_.used[2] + fit_.used[3];
     fit_.inlier_rms_sigmas = inliers ? std::sqrt(squares / inliers) : 0;
   }
   void tell(const PrintFit& print) {
@@ -288,11 +286,10 @@ double FineFit::located_fraction() const {
   return static_cast<double>(located) / std::max(1, in_image[0] + in_image[1] + in_image[2] + in_image[3]);
 }
 
-FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknowns& start, EdgeBlur blur,
-                   const Expected& expected) {
+FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknowns& start, const Expected& expected) {
   FineFit fit;
   fit.unknowns = start;
-  fit.blur = blur;
+  fit.blur = expected.blur.value_or(EdgeBlur());
   fit.departure = expected.departure;
   Fitter fitter(scene, light, fit);
   if (!fitter.settle() || !fitter.see_camera(expected)) return fit;

@@ -67,20 +67,20 @@ struct FineFit {
 /// Expectations by the frames before. `ask`: whether to look at what the camera did to the image beyond its response
 /// (picture_processing.h), which costs a tenth of a tracked frame's time where it did nothing. bias_px, an earlier
 /// frame's, is the uncertainty of a frame that can't show it. `departure` is what earlier frames showed of the camera.
-/// A frame whose boundaries' mean blur is another than `blur_px` is examined in any case: the camera's sharpening may
-/// have been switched on.
+/// A frame whose boundaries' mean blur is another than that of `blur` is examined in any case: the camera's sharpening
+/// may have been switched on.
 struct Expected {
   bool ask = true;
+  std::optional<EdgeBlur> blur = {};
   std::array<double, 4> bias_px{};
   CameraDeparture departure = {};
-  std::optional<double> blur_px = {};
   std::optional<PoseUnknowns> moved_on = {};  ///< where the marker is if it moves as it did
 };
 
 /// Fits the pose to all boundaries on all visible generatrices and to the shaft's sides, located to a fraction of a
 /// pixel in linear light, with a robust loss. `start` must be good to some pixels. The result is held at the RCM where
 /// the scene has a registration and the image does not contradict it, whatever the start is.
-FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknowns& start, EdgeBlur blur,
+FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknowns& start,
                    const Expected& expected = {});
 
 }  // namespace lapservo::internal

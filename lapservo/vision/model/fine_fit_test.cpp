@@ -5,7 +5,6 @@
 #include <Eigen/Cholesky>
 #include <gtest/gtest.h>
 
-#include "lapservo/core/angles.h"
 #include "lapservo/testing/shots.h"
 
 namespace lapservo::internal {
@@ -28,13 +27,13 @@ double normalised_square(const Shot& shot, const FineFit& fit, const PoseUnknown
   if (!fit.unknowns.through_rcm()) return error.dot(fit.covariance.ldlt().solve(error)) / pose_unknowns;
   const auto q =
       configuration_estimate(fit.unknowns, fit.covariance, *shot.sight.scene().registration, fit.with_registration);
-  Eigen::Vector4d off = q->q.vector() - scenes::q_of(shot.rig, from).vector();
-  for (const Eigen::Index angle : {0, 1, 3}) off[angle] = wrap_pi(off[angle]);
+  const Eigen::Vector4d off = configuration_change(scenes::q_of(shot.rig, from), q->q);
   return off.dot(q->covariance.ldlt().solve(off)) / 4;
 }
 
 // The sigmas include floors for what a renderer has none of (lens, print), so errors here stay somewhat below them.
 void expect_honest(bool rcm) {
+  SCOPED_TRACE(rcm ? "through the RCM" : "free");
   constexpr int frames = 48, bounded = 16;
   double squares = 0, psi_squares = 0, psi_sum = 0;
   int far = 0;
@@ -61,11 +60,8 @@ void expect_honest(bool rcm) {
   EXPECT_LE(far, 1) << "of chi^2 of four degrees of freedom three in a thousand";
   EXPECT_NEAR(psi_sum / frames, 0, 1.5e-3);
 }
-TEST(FineFit, ErrorsAreAsPredictedThroughTheRcm) {
-  expect_honest(true);
-}
-TEST(FineFit, ErrorsAreAsPredictedWithoutTheRcm) {
-  expect_honest(false);
+TEST(FineFit, ErrorsAreAsPredictedThroughTheRcmOrNot) {
+  for (const bool rcm : {true, false}) expect_honest(rcm);
 }
 
 // Whichever side it comes from: Gauss-Newton with right derivatives ends at the same place.
@@ -102,9 +98,7 @@ TEST(FineFit, FindsBackAlongTheShaftFromEitherSide) {
 
 TEST(FineFit, FindsTheBlurOfTheCamera) {
   for (const double blur_px : {0.8, 1.3, 1.8}) {
-    RenderOptions options;
-    options.sensor.blur_px = blur_px;
-    const Shot shot(3, options);
+    const Shot shot(3, {.lighting = {}, .sensor = {.blur_px = blur_px}});
     const FineFit fit = fit_from(shot, shot.truth(true));
     ASSERT_TRUE(fit.converged) << blur_px;
     // A pixel's own area, and the interpolation between pixels, blur too.
@@ -115,8 +109,7 @@ TEST(FineFit, FindsTheBlurOfTheCamera) {
 }
 
 TEST(FineFit, SigmasGrowWithTheNoise) {
-  RenderOptions noisy;
-  noisy.sensor.read_noise *= 12;
+  const RenderOptions noisy{.lighting = {}, .sensor = {.read_noise = 12 * Sensor{}.read_noise}};
   scenes::for_each_shot(3, [&](const Shot& clear) {
     const Shot rough(clear.seed, noisy);
     const FineFit in_clear = fit_from(clear, clear.truth(true)), in_rough = fit_from(rough, rough.truth(true));

@@ -1,5 +1,3 @@
-#include "lapservo/vision/model/print_doubt.h"
-
 #include <cmath>
 #include <vector>
 
@@ -7,9 +5,9 @@
 
 #include "lapservo/core/random.h"
 #include "lapservo/testing/markers.h"
+#include "lapservo/vision/model/print_evidence.h"
 
-namespace lapservo::internal {
-namespace print_doubt_test {
+namespace lapservo::internal::print_doubt_test {
 
 struct Line {
   std::size_t boundary;
@@ -17,9 +15,7 @@ struct Line {
   PrintVector row;  // px/mm
 };
 
-Marker example_marker() {
-  return testing::marker_with({0.0035, 0.0035, 0.017}, {0.0095, 0.0095, 0.005});
-}
+const Marker example = testing::marker_with({0.0035, 0.0035, 0.017}, {0.0095, 0.0095, 0.005});
 
 // Measurements of the boundaries' parts between these turn fractions.
 std::vector<Line> random_lines(Random& random, double first, double last) {
@@ -61,7 +57,7 @@ TEST(PrintDoubt, MovesEachBoundaryByAsMuchAsIsDoubted) {
   const auto lines = random_lines(random, 0.3, 0.8);
   const Sums sums(lines);
   const PrintDoubt doubt{0.3, 0.7, 0};
-  const PrintShapes shapes = shapes_of(doubt, sums.squares, sums.weights, example_marker());
+  const PrintShapes shapes = shapes_of(doubt, sums.squares, sums.weights, example);
   for (std::size_t k = 0; k < 4; ++k) {
     double moved = 0;
     for (const PrintVector& shape : shapes) moved += mean_square_px2(lines, k, shape);
@@ -71,11 +67,10 @@ TEST(PrintDoubt, MovesEachBoundaryByAsMuchAsIsDoubted) {
 }
 
 TEST(PrintDoubt, OfTheLengthLeavesTheCrossRatioAlone) {
-  const Marker marker = example_marker();
   const PrintDoubt doubt{0, 0, 0.01};
-  const PrintVector longer_mm = shapes_of(doubt, PrintMatrix::Zero(), {}, marker)[0];
+  const PrintVector longer_mm = shapes_of(doubt, PrintMatrix::Zero(), {}, example)[0];
   for (const int edge : {0, 1}) {
-    const auto along_m = boundaries_m(marker, edge * 0.999999 * marker.covered_rad());
+    const auto along_m = boundaries_m(example, edge * 0.999999 * example.covered_rad());
     for (std::size_t k = 0; k < 4; ++k)
       EXPECT_NEAR(longer_mm[errors_of_boundary[k][static_cast<std::size_t>(edge)]], 10 * along_m[k], 1e-4);
   }
@@ -86,12 +81,11 @@ TEST(PrintDoubt, DoubtsNothingOfWhatIsNotSeen) {
   auto lines = random_lines(random, 0, 1);
   std::erase_if(lines, [](const Line& line) { return line.boundary == 2; });
   const Sums sums(lines);
-  for (const PrintVector& shape : shapes_of({0.3, 0.7, 0}, sums.squares, sums.weights, example_marker())) {
+  for (const PrintVector& shape : shapes_of({0.3, 0.7, 0}, sums.squares, sums.weights, example)) {
     EXPECT_TRUE(shape.allFinite());
     EXPECT_EQ(shape[3], 0);
     EXPECT_EQ(shape[4], 0);
   }
 }
 
-}  // namespace print_doubt_test
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::print_doubt_test

@@ -74,21 +74,21 @@ GroupPull gathered(const Products& products, std::size_t group, PrintEquations& 
   return pull;
 }
 
-double certainty_about(const Measurement& m, const ResidualLines& lines, const CommonErrors& errors) {
-  const double sigmas = lines[m.group].residual_px(m) / m.sigma_px, noise_px = errors.noise_scale(m) * m.sigma_px;
+double certainty_of(const Measurement& m, const CommonErrors& errors) {
+  const double sigmas = errors.lines[m.group].residual_px(m) / m.sigma_px,
+               noise_px = errors.noise_scale(m) * m.sigma_px;
   return cauchy_weight(sigmas, cauchy_scale_sigmas) / (noise_px * noise_px);
 }
 
 // All boundaries moved alike, leaning alike, or bowed alike.
-void add_pulls_of_all(std::span<const Measurement> measurements, const ResidualLines& lines, const CommonErrors& errors,
-                      PrintSums& sums) {
+void add_pulls_of_all(std::span<const Measurement> measurements, const CommonErrors& errors, PrintSums& sums) {
   const std::array<double, 3> patterns_px{errors.whole_px, errors.leaning_px, errors.bowed_px};
   std::array<GroupPull, 3> pulls;
   std::array<double, 3> squares{};
   double all = 0;
   for (const Measurement& m : measurements) {
     if (m.group >= errors_of_boundary.size()) continue;
-    const double weight = certainty_about(m, lines, errors);
+    const double weight = certainty_of(m, errors);
     const std::array<double, 3> moved{1, m.across, m.across * m.across - 1.0 / 3};
     for (std::size_t i = 0; i < pulls.size(); ++i) {
       const double part = weight * moved[i];
@@ -105,11 +105,10 @@ void add_pulls_of_all(std::span<const Measurement> measurements, const ResidualL
 }
 
 // One sigma of each number of the rig's camera and marker.
-void add_pulls_of_camera(std::span<const Measurement> measurements, const ResidualLines& lines,
-                         const CommonErrors& errors, PrintSums& sums) {
+void add_pulls_of_camera(std::span<const Measurement> measurements, const CommonErrors& errors, PrintSums& sums) {
   std::array<CameraPull, RigErrors::most> pulls;
   for (const Measurement& m : measurements) {
-    const RigErrors::Shifts shifts = certainty_about(m, lines, errors) * errors.rig.of(m);
+    const RigErrors::Shifts shifts = certainty_of(m, errors) * errors.rig.of(m);
     for (int i = 0; i < RigErrors::most; ++i) {
       CameraPull& pull = pulls[static_cast<std::size_t>(i)];
       pull.add(m, shifts[i]);
@@ -154,19 +153,17 @@ InplaceVector<PrintVector, RigErrors::most> shapes_of_camera(const PrintInformat
 
 }  // namespace
 
-PrintSums print_sums(std::span<const Measurement> measurements, const ResidualLines& lines, double film_prior,
-                     const CommonErrors& errors) {
+PrintSums print_sums(std::span<const Measurement> measurements, double film_prior, const CommonErrors& errors) {
   std::array<Products, measurement_groups> products;
-  for (const Measurement& m : measurements) products[m.group].add(m, certainty_about(m, lines, errors));
+  for (const Measurement& m : measurements) products[m.group].add(m, certainty_of(m, errors));
   PrintSums sums;
   for (std::size_t group = 0; group < measurement_groups; ++group) {
     sums.pulls[group] = gathered(products[group], group, sums.equations);
     sums.pulls[group].error_px = errors.px[group];
   }
   sums.equations.add(UnknownVector::Unit(film_unknown), PrintVector::Zero(), 1, film_prior);
-  if (errors.whole_px > 0 || errors.leaning_px > 0 || errors.bowed_px > 0)
-    add_pulls_of_all(measurements, lines, errors, sums);
-  if (errors.rig.any()) add_pulls_of_camera(measurements, lines, errors, sums);
+  if (errors.whole_px > 0 || errors.leaning_px > 0 || errors.bowed_px > 0) add_pulls_of_all(measurements, errors, sums);
+  if (errors.rig.any()) add_pulls_of_camera(measurements, errors, sums);
   return sums;
 }
 

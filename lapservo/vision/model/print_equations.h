@@ -8,7 +8,6 @@
 #include "lapservo/vision/edges/edge_measurements.h"
 #include "lapservo/vision/model/common_errors.h"
 #include "lapservo/vision/model/print_evidence.h"
-#include "lapservo/vision/model/residual_lines.h"
 #include "lapservo/vision/shaft/rcm_prior.h"
 
 namespace lapservo::internal {
@@ -71,9 +70,8 @@ struct PrintSums {
   InplaceVector<CameraPull, RigErrors::most> camera;
 };
 
-/// Weighted robustly about `lines`. `film_prior` as the fit has it.
-PrintSums print_sums(std::span<const Measurement> measurements, const ResidualLines& lines, double film_prior,
-                     const CommonErrors& errors);
+/// Weighted robustly about the errors' lines. `film_prior` as the fit has it.
+PrintSums print_sums(std::span<const Measurement> measurements, double film_prior, const CommonErrors& errors);
 
 /// The same of a shaft that is held at the RCM.
 PrintSums held(PrintSums sums, const RcmMeasurement& rcm);

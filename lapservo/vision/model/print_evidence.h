@@ -1,10 +1,23 @@
 #pragma once
 
+#include <array>
 #include <span>
 
-#include "lapservo/vision/model/print_doubt.h"
+#include <Eigen/Core>
+
+#include "lapservo/core/inplace_vector.h"
+#include "lapservo/marker/marker.h"
 
 namespace lapservo::internal {
+
+/// Where a print's boundaries may lie elsewhere than the rig says [mm, distal]: e0, e1 at both edges of the print, e2
+/// at both edges, e3: the ends are circles.
+inline constexpr int print_errors = 6;
+using PrintVector = Eigen::Matrix<double, print_errors, 1>;
+using PrintMatrix = Eigen::Matrix<double, print_errors, print_errors>;
+
+/// Which of them boundary 0..3 has at its upper and at its lower edge (tau = 0 and tau -> 2 pi).
+inline constexpr std::array<std::array<int, 2>, 4> errors_of_boundary{{{0, 0}, {1, 2}, {3, 4}, {5, 5}}};
 
 /// The residuals' evidence about the print's errors: the Gaussian likelihood exp(gradient . x - x . information x / 2),
 /// x in millimetres.
@@ -12,6 +25,21 @@ struct PrintInformation {
   PrintMatrix information = PrintMatrix::Zero();  ///< positive semi-definite
   PrintVector gradient = PrintVector::Zero();
 };
+
+/// How an image that is blurred, compressed or processed moves boundaries as a print's errors would, one sigma each:
+/// every boundary as a whole, the inner ones about their middle (rms over what shows), and all as if the marker were
+/// longer by this fraction.
+struct PrintDoubt {
+  double boundary_px = 0, tilt_px = 0, length_fraction = 0;
+};
+
+/// Errors of the print [mm] by one sigma of what is uncertain, independent of each other.
+using PrintShapes = InplaceVector<PrintVector, 7>;
+
+/// `squares_px2_per_mm2`: the weighted squares of d(residual)/d(print's errors) summed over all measurements, `weights`
+/// the sum of each boundary's weights: a boundary without any has no uncertainty.
+PrintShapes shapes_of(const PrintDoubt& doubt, const PrintMatrix& squares_px2_per_mm2,
+                      const std::array<double, 4>& weights, const Marker& marker);
 
 /// Their evidence when such shapes of unknown size (one sigma each) may be in them: the covariance that the information
 /// stands for grows by them (the Woodbury identity, a shape at a time).
@@ -28,18 +56,8 @@ struct PrintPrior {
 /// leave [mm^2]. Bands are taken to be off by a picometre at least, by a micrometre where the ink lies aside.
 PrintMatrix covariance_of(const PrintMatrix& information_by_boundary, const PrintPrior& prior);
 
-/// How likely residuals make prints of any size of errors.
-class PrintEvidence {
- public:
-  explicit PrintEvidence(const PrintInformation& print);
-
-  /// Logarithm of the likelihood of such a print, compared with an exact one's.
-  double gain(const PrintPrior& prior) const;
-
- private:
-  PrintInformation print_;
-  PrintVector by_ink_;  // information * c
-  double ink_ = 0;      // c^T information c
-};
+/// How likely residuals make a print of such a size of errors, compared with an exact one: the logarithm of both
+/// likelihoods' ratio.
+double likelihood_gain(const PrintInformation& print, const PrintPrior& prior);
 
 }  // namespace lapservo::internal

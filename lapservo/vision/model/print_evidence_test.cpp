@@ -7,8 +7,7 @@
 
 #include "lapservo/core/random.h"
 
-namespace lapservo::internal {
-namespace print_evidence_test {
+namespace lapservo::internal::print_evidence_test {
 
 PrintVector random_vector(Random& random) {
   PrintVector v;
@@ -63,20 +62,16 @@ TEST(PrintEvidence, IsThatOfTheMarginalLikelihood) {
         return -0.5 * (measured.dot(covariance.inverse() * measured) + std::log(covariance.determinant()));
       };
       const double expected = log_likelihood(both) - log_likelihood(noise);
-      EXPECT_NEAR(PrintEvidence(print).gain(prior), expected, 1e-6 * (1 + std::abs(expected)));
+      EXPECT_NEAR(likelihood_gain(print, prior), expected, 1e-6 * (1 + std::abs(expected)));
     }
 }
 
-TEST(PrintEvidence, OfWhatTellsNothingIsNone) {
-  const PrintEvidence evidence({});
-  for (const double ink_mm : {0.0, 0.3}) EXPECT_EQ(evidence.gain({0.3, ink_mm}), 0);
-}
-
-TEST(PrintEvidence, CanBeHadWhereSomeErrorsDoNotShow) {
+TEST(PrintEvidence, CanBeHadWhereSomeErrorsDoNotShowAndIsNoneWhereNoneDoes) {
+  for (const double ink_mm : {0.0, 0.3}) EXPECT_EQ(likelihood_gain({}, {0.3, ink_mm}), 0);
   Random random(3);
   for (int measurements = 1; measurements < print_errors; ++measurements) {
-    const PrintEvidence evidence(random_information(random, measurements));
-    for (const double ink_mm : {0.0, 0.64}) EXPECT_TRUE(std::isfinite(evidence.gain({0.64, ink_mm})));
+    const PrintInformation print = random_information(random, measurements);
+    for (const double ink_mm : {0.0, 0.64}) EXPECT_TRUE(std::isfinite(likelihood_gain(print, {0.64, ink_mm})));
   }
 }
 
@@ -97,5 +92,4 @@ TEST(PrintEvidence, AndThePriorLeaveTheirCommonCovariance) {
     }
 }
 
-}  // namespace print_evidence_test
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::print_evidence_test

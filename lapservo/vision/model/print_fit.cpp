@@ -26,34 +26,30 @@ using Hypotheses = InplaceVector<Hypothesis, hypotheses>;
 Hypotheses prior_hypotheses(const Marker& marker, bool is_known) {
   const double tolerance_mm = marker.boundary_sigma_m() / mm_in_m;
   const bool is_measured = marker.measured_sigma_m().has_value();
-  const auto fraction_of = [&](const ErrorSize& size) {
-    const bool seldom = (is_known && size.mm >= limits.off_mm) || (is_measured && size.mm > tolerance_mm);
-    return seldom ? limits.fraction_of_known : size.fraction;
+  const auto with_none = [&](std::span<const ErrorSize> sizes) {
+    InplaceVector<ErrorSize, 1 + limits.bands.size()> all;
+    all.push_back({0, 1});
+    for (const ErrorSize& size : sizes) {
+      const bool seldom = (is_known && size.mm >= limits.off_mm) || (is_measured && size.mm > tolerance_mm);
+      const double fraction = seldom ? limits.fraction_of_known : size.fraction;
+      all.push_back({size.mm, fraction});
+      all[0].fraction -= fraction;
+    }
+    return all;
   };
-  const auto right = [&](const auto& sizes) {
-    double fraction = 1;
-    for (const ErrorSize& size : sizes) fraction -= fraction_of(size);
-    return fraction;
-  };
-  const double ink_right = right(limits.inks);
   Hypotheses all;
-  const auto add = [&](double bands_mm, double ink_mm, double weight) {
-    all.push_back({{std::hypot(bands_mm, tolerance_mm), ink_mm}, std::max(bands_mm, ink_mm) >= limits.off_mm, weight});
-  };
-  const auto add_inks = [&](double bands_mm, double weight) {
-    add(bands_mm, 0, weight * ink_right);
-    for (const ErrorSize& ink : limits.inks) add(bands_mm, ink.mm, weight * fraction_of(ink));
-  };
-  add_inks(0, right(limits.bands));
-  for (const ErrorSize& bands : limits.bands) add_inks(bands.mm, fraction_of(bands));
+  for (const ErrorSize& bands : with_none(limits.bands))
+    for (const ErrorSize& ink : with_none(limits.inks))
+      all.push_back({{std::hypot(bands.mm, tolerance_mm), ink.mm},
+                     std::max(bands.mm, ink.mm) >= limits.off_mm,
+                     bands.fraction * ink.fraction});
   return all;
 }
 
 // Weighted by how likely the residuals are; the weights add up to 1.
 Hypotheses weighted(Hypotheses all, const PrintInformation& evidence) {
-  const PrintEvidence of(evidence);
   std::array<double, hypotheses> gains;
-  for (std::size_t i = 0; i < hypotheses; ++i) gains[i] = of.gain(all[i].prior);
+  for (std::size_t i = 0; i < hypotheses; ++i) gains[i] = likelihood_gain(evidence, all[i].prior);
   const double best = *std::max_element(gains.begin(), gains.end());
   double sum = 0;
   for (std::size_t i = 0; i < hypotheses; ++i) sum += all[i].weight *= std::exp(gains[i] - best);
@@ -61,8 +57,12 @@ Hypotheses weighted(Hypotheses all, const PrintInformation& evidence) {
   return all;
 }
 
+// The frame's evidence about pose and print: the mean over all sizes of errors.
 class Mixture {
  public:
+  PrintSolution as_the_rig_says;
+  double off_probability = 0;
+
   void add(const PrintSolution& solution, double weight) {
     step_ += weight * solution.step;
     print_mm_ += weight * solution.print_mm;
@@ -92,15 +92,8 @@ class Mixture {
   InplaceVector<Part, hypotheses> parts_;
 };
 
-// The frame's evidence about pose and print: each size of errors with its weight, and the mean over them.
-struct Judgement {
-  Hypotheses all;
-  PrintSolution as_the_rig_says;
-  Mixture mixture;
-};
-
-std::optional<Judgement> judged(const PrintSums& sums, const Hypotheses& prior, const PrintDoubt& doubt,
-                                const Marker& marker) {
+std::optional<Mixture> mixed(const PrintSums& sums, const Hypotheses& prior, const PrintDoubt& doubt,
+                             const Marker& marker) {
   const auto as_the_rig_says = solved_with_print(sums, prior[0].prior);
   if (!as_the_rig_says) return std::nullopt;
   // Nothing, where the frame shows nothing of the print.
@@ -108,15 +101,18 @@ std::optional<Judgement> judged(const PrintSums& sums, const Hypotheses& prior, 
   std::array<double, 4> weights{};
   for (std::size_t k = 0; k < weights.size(); ++k) weights[k] = sums.pulls[k].weight;
   const PrintShapes shapes_mm = shapes_of(doubt, sums.equations.nn, weights, marker);
-  Judgement out{weighted(prior, doubted(print, shapes_mm)), *as_the_rig_says, {}};
-  out.mixture.add(*as_the_rig_says, out.all[0].weight);
-  for (std::size_t i = 1; i < out.all.size(); ++i) {
-    if (out.all[i].weight < limits.min_weight) continue;
-    const auto off = solved_with_print(sums, out.all[i].prior);
+  const Hypotheses all = weighted(prior, doubted(print, shapes_mm));
+  Mixture mixture;
+  mixture.as_the_rig_says = *as_the_rig_says;
+  mixture.add(*as_the_rig_says, all[0].weight);
+  for (std::size_t i = 1; i < all.size(); ++i) {
+    if (all[i].is_off) mixture.off_probability += all[i].weight;
+    if (all[i].weight < limits.min_weight) continue;
+    const auto off = solved_with_print(sums, all[i].prior);
     if (!off) return std::nullopt;
-    out.mixture.add(*off, out.all[i].weight);
+    mixture.add(*off, all[i].weight);
   }
-  return out;
+  return mixture;
 }
 
 // By how many sigmas of both the shaft at `step` misses the RCM.
@@ -133,8 +129,8 @@ double missed_by_image(const PrintSums& by_image, const RcmMeasurement& rcm, con
   const auto free = solved_with_print(by_image, prior[0].prior);
   const double sigmas = free ? missed_sigmas(free->step, free->covariance, rcm) : 0;
   if (!(sigmas > limits.clearly_missed_sigmas)) return sigmas;
-  const auto whole = judged(by_image, prior, doubt, marker);
-  return whole ? missed_sigmas(whole->mixture.step(), whole->mixture.covariance(), rcm) : 0;
+  const auto whole = mixed(by_image, prior, doubt, marker);
+  return whole ? missed_sigmas(whole->step(), whole->covariance(), rcm) : 0;
 }
 
 }  // namespace
@@ -144,10 +140,9 @@ double p_false_of(double mean_rad, double variance_rad2) {
   return 0.5 * (std::erfc((limit_rad - mean_rad) * scale) + std::erfc((limit_rad + mean_rad) * scale));
 }
 
-std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const ResidualLines& lines,
-                                  const std::optional<RcmBesideFit>& rcm, double film_prior, const Marker& marker,
-                                  bool is_known, const CommonErrors& errors) {
-  const PrintSums by_image = print_sums(measurements, lines, film_prior, errors);
+std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const std::optional<RcmBesideFit>& rcm,
+                                  double film_prior, const Marker& marker, bool is_known, const CommonErrors& errors) {
+  const PrintSums by_image = print_sums(measurements, film_prior, errors);
   const Hypotheses prior = prior_hypotheses(marker, is_known);
   PrintFit fit;
   const auto is_contradicted = [&] {
@@ -157,7 +152,7 @@ std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const Res
   };
   fit.through_rcm = rcm && !is_contradicted();
   const PrintSums sums = fit.through_rcm ? held(by_image, rcm->measurement) : by_image;
-  const auto print = judged(sums, prior, errors.doubt, marker);
+  const auto print = mixed(sums, prior, errors.doubt, marker);
   if (!print) return std::nullopt;
   const auto exact = prior[0].prior.bands_mm > 0 ? solved_with_print(sums, {}) : print->as_the_rig_says;
   // Where the passes ended, and the measurements were taken.
@@ -165,18 +160,16 @@ std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const Res
   const auto settled =
       as_passes ? exact : solved_with_print(fit.through_rcm ? by_image : held(by_image, rcm->measurement), {});
   if (!exact || !settled) return std::nullopt;
-  fit.step = print->mixture.step() - settled->step;
+  fit.step = print->step() - settled->step;
   fit.step_as_the_rig_says = print->as_the_rig_says.step - settled->step;
-  for (Measurement& m : measurements)
-    m.residual_px -= m.row.dot(fit.step) + print_shift_px(m, print->mixture.print_mm());
-  fit.covariance = print->mixture.covariance().topLeftCorner<pose_unknowns, pose_unknowns>();
+  for (Measurement& m : measurements) m.residual_px -= m.row.dot(fit.step) + print_shift_px(m, print->print_mm());
+  fit.covariance = print->covariance().topLeftCorner<pose_unknowns, pose_unknowns>();
   if (fit.through_rcm)
     fit.by_rcm_m = (print->as_the_rig_says.inverse * rcm->measurement.rows.transpose() * rcm->measurement.by_rcm_m)
                        .topRows<pose_unknowns>();
   const auto psi_variance = [](const PrintSolution& s) { return s.covariance(psi_unknown, psi_unknown); };
-  for (const Hypothesis& hypothesis : print->all)
-    if (hypothesis.is_off) fit.off_probability += hypothesis.weight;
-  fit.p_false = print->mixture.p_false();
+  fit.off_probability = print->off_probability;
+  fit.p_false = print->p_false();
   fit.p_false_by_tolerance = p_false_of(0, psi_variance(print->as_the_rig_says)) - p_false_of(0, psi_variance(*exact));
   fit.psi_variance_by_tolerance = psi_variance(print->as_the_rig_says) - psi_variance(*exact);
   return fit;

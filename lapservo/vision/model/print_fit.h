@@ -8,7 +8,6 @@
 #include "lapservo/marker/marker.h"
 #include "lapservo/vision/edges/edge_measurements.h"
 #include "lapservo/vision/model/common_errors.h"
-#include "lapservo/vision/model/residual_lines.h"
 #include "lapservo/vision/shaft/rcm_prior.h"
 
 namespace lapservo::internal {
@@ -69,11 +68,10 @@ struct RcmBesideFit {
 
 /// Estimates the print's errors from the settled measurements' residuals. How large they usually are is not known, so
 /// the pose is a mean over the rig's print and misprints (PrintLimits), each weighted by how likely it makes the
-/// residuals. On return the residuals are those that the step and the print's likeliest errors leave. `lines` are those
-/// of these residuals, `film_prior` as the fit has it, `is_known`: earlier frames showed that the print is the rig's.
-/// Nullopt when a direction is not seen at all.
-std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const ResidualLines& lines,
-                                  const std::optional<RcmBesideFit>& rcm, double film_prior, const Marker& marker,
-                                  bool is_known, const CommonErrors& errors);
+/// residuals. On return the residuals are those that the step and the print's likeliest errors leave. `film_prior` as
+/// the fit has it, `is_known`: earlier frames showed that the print is the rig's. Nullopt when a direction is not seen
+/// at all.
+std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const std::optional<RcmBesideFit>& rcm,
+                                  double film_prior, const Marker& marker, bool is_known, const CommonErrors& errors);
 
 }  // namespace lapservo::internal

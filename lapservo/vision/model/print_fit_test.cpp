@@ -13,8 +13,7 @@
 #include "lapservo/testing/shots.h"
 #include "lapservo/vision/model/fine_fit.h"
 
-namespace lapservo::internal {
-namespace print_fit_test {
+namespace lapservo::internal::print_fit_test {
 
 using scenes::Shot;
 using scenes::Sight;
@@ -37,10 +36,9 @@ PrintFit fit_of(const Shot& shot, const Marker& believed, std::optional<std::siz
     for (const Measurement& m : all)
       if (m.group != *hidden) edges.all.push_back(m);
   }
-  const ResidualLines lines = residual_lines(edges.all);
-  const CommonErrors errors = common_errors(edges, lines, lens, std::nullopt, {}, {});
-  return fit_print(edges.all, lines, RcmBesideFit{sight.scene().registration->of(truth.pose(), 1e-7), true, true}, 0,
-                   believed, is_known, errors)
+  const CommonErrors errors = common_errors(edges, lens, std::nullopt, {}, {});
+  return fit_print(edges.all, RcmBesideFit{sight.scene().registration->of(truth.pose(), 1e-7), true, true}, 0, believed,
+                   is_known, errors)
       .value();
 }
 
@@ -122,5 +120,4 @@ TEST(PrintFit, AnErrorIsFalseBeyondATenthOfARadian) {
   EXPECT_LT(p_false_of(0, 0.02 * 0.02), 1e-6);
 }
 
-}  // namespace print_fit_test
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::print_fit_test

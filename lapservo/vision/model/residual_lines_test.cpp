@@ -1,13 +1,11 @@
-#include "lapservo/vision/model/residual_lines.h"
-
 #include <vector>
 
 #include <gtest/gtest.h>
 
 #include "lapservo/core/random.h"
+#include "lapservo/vision/model/common_errors.h"
 
-namespace lapservo::internal {
-namespace residual_lines_test {
+namespace lapservo::internal::residual_lines_test {
 
 constexpr double px_per_m = 11'000, sigma_px = 0.04;
 
@@ -56,5 +54,4 @@ TEST(ResidualLines, ASidesIsAConstantInPixels) {
   EXPECT_LT(line.residual_px(all[0]), 5 * sigma_px);
 }
 
-}  // namespace residual_lines_test
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::residual_lines_test

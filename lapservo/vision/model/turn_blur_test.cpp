@@ -9,9 +9,7 @@
 
 #include <gtest/gtest.h>
 
-namespace lapservo::internal {
-namespace turn_blur_test {
-namespace {
+namespace lapservo::internal::turn_blur_test {
 
 constexpr double lens_px = 0.95;
 
@@ -82,23 +80,16 @@ TEST(TurnBlur, TellsNothingWithoutBothInnerBoundariesAndAnEnd) {
   }
 }
 
-TEST(TurnBlur, IsTakenForAStartFromRest) {
+// A third of the turn within the exposure has been made in its mean.
+TEST(TurnBlur, IsTakenForAStartFromRestBoundedByWhatTheTurnChangedFromFrameToFrame) {
   constexpr double turn_rad = 0.1;
   const TurnBlur blur{of_from_rest(turn_rad), 5e-5};
   EXPECT_NEAR(std::sqrt(variance_of_uneven_turn(blur, std::nullopt)), turn_rad / 12, 1e-5);
   for (const double noise : {-2.0, -1.0, 0.0, 1.0, 2.0})
     EXPECT_EQ(variance_of_uneven_turn({noise * 5e-5, 5e-5}, std::nullopt), 0) << noise;
-}
-
-// A third of the turn within the exposure has been made in its mean.
-TEST(TurnBlur, IsBoundedByWhatTheTurnChangedFromFrameToFrame) {
-  constexpr double turn_rad = 0.1;
-  const TurnBlur blur{of_from_rest(turn_rad), 5e-5};
   EXPECT_LT(std::sqrt(variance_of_uneven_turn(blur, 1e-4)), 1e-4);
   EXPECT_NEAR(std::sqrt(variance_of_uneven_turn(blur, turn_rad / 3)), turn_rad / 12, 1e-5);
   EXPECT_EQ(variance_of_uneven_turn({1e-5, 5e-5}, turn_rad / 3), 0) << "noise";
 }
 
-}  // namespace
-}  // namespace turn_blur_test
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::turn_blur_test

@@ -64,6 +64,7 @@ BandMasks segment(const cv::Mat& hsv, const Marker& marker) {
 struct Region {
   cv::Mat pixels;  // 255 inside
   cv::Rect box;
+  int area_px;
 };
 
 // Connected regions of the three colours together, largest first.
@@ -71,17 +72,14 @@ std::vector<Region> regions_of(const BandMasks& masks) {
   cv::Mat together = masks[0] | masks[1] | masks[2], joined, labels, stats, centroids;
   cv::morphologyEx(together, joined, cv::MORPH_CLOSE, ellipse(9));
   const int count = cv::connectedComponentsWithStats(joined, labels, stats, centroids);
-  std::vector<int> order;
-  for (int i = 1; i < count; ++i)
-    if (stats.at<int>(i, cv::CC_STAT_AREA) >= min_area_px) order.push_back(i);
-  std::sort(order.begin(), order.end(),
-            [&](int a, int b) { return stats.at<int>(a, cv::CC_STAT_AREA) > stats.at<int>(b, cv::CC_STAT_AREA); });
   std::vector<Region> regions;
-  for (const int i : order) {
+  for (int i = 1; i < count; ++i) {
     const cv::Rect box(stats.at<int>(i, cv::CC_STAT_LEFT), stats.at<int>(i, cv::CC_STAT_TOP),
                        stats.at<int>(i, cv::CC_STAT_WIDTH), stats.at<int>(i, cv::CC_STAT_HEIGHT));
-    regions.push_back({labels == i, box});
+    const int area_px = stats.at<int>(i, cv::CC_STAT_AREA);
+    if (area_px >= min_area_px) regions.push_back({labels == i, box, area_px});
   }
+  std::sort(regions.begin(), regions.end(), [](const Region& a, const Region& b) { return a.area_px > b.area_px; });
   return regions;
 }
 

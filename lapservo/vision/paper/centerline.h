@@ -17,16 +17,14 @@ namespace lapservo::internal {
 /// the same equations.
 class CenterlineMethod {
  public:
+  /// Borrows the rig, whose registrations may change from frame to frame.
   explicit CenterlineMethod(const Rig& rig);
 
   /// `image_bgr`: 8-bit BGR of the rig's size. One observation per instrument.
   std::vector<Observation> observe(const cv::Mat& image_bgr) const;
 
-  /// Tracker::set_registration().
-  void set_registration(std::size_t i, const Instrument& moved) { rig_.instruments[i] = moved; }
-
  private:
-  Rig rig_;
+  const Rig& rig_;
   std::vector<CrossRatioDecoder> decoders_;
 };
 

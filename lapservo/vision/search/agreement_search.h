@@ -1,18 +1,26 @@
 #pragma once
 
+#include <cmath>
 #include <optional>
 #include <vector>
 
 #include "lapservo/core/random.h"
-#include "lapservo/vision/search/explained_colours.h"
 #include "lapservo/vision/search/work_budget.h"
 #include "lapservo/vision/shaft/scene.h"
 #include "lapservo/vision/shaft/shaft_pose.h"
 
 namespace lapservo::internal {
 
+/// How much of the frame's colours a marker in this pose explains, of which blood may hide much [px^2, about]: the area
+/// that shows the colour that belongs there, less a little for what blood hides, less what contradicts: other colours,
+/// and bare shaft, which has none at all, on the marker; the marker's colours beside it, and blood where bare shaft
+/// should be. By area, since of shafts that lie within the colours the largest explains most. `turned`: at the pose's
+/// rotation; else as at any. Only areas above `above_px2` are wanted: no_area_px2 as soon as it can't be one.
+inline constexpr double no_area_px2 = -HUGE_VAL;
+double explained_area_px2(const Scene& scene, const ShaftPose& pose, bool turned, double above_px2 = no_area_px2);
+
 /// For markers that blood hides in large parts, where fitted sides and ends mislead: climbs to where a marker of any
-/// rotation explains most of the frame's colours (explained_colours.h), from the start's depth and nearer ones, and
+/// rotation explains most of the frame's colours (explained_area_px2()), from the start's depth and nearer ones, and
 /// from there at the rotations that do. Only for unknowns with an RCM. May stop after every step of a climb and go on
 /// in the next frame: the marker moves less between them than a climb reaches.
 class AgreementSearch {
@@ -29,21 +37,17 @@ class AgreementSearch {
   PoseUnknowns in_this_frame(const Scene& scene, const PoseUnknowns& result, WorkBudget& budget);
 
  private:
-  // A configuration in the terms of the image: the shaft's direction turned across and along the line of sight.
-  struct ImageTerms {
+  // In the terms of the image: the shaft's direction turned across and along the line of sight.
+  struct Climb {
     Rigid3 camera_from_rcm;
     Eigen::Vector3d axis, across, away;  // in the camera
     Eigen::Vector4d values;              // turns across and away [rad], rho [m], psi [rad]
-
-    static ImageTerms of(const Rigid3& camera_from_rcm, const PoseUnknowns& start);
-    std::optional<PoseUnknowns> unknowns(const Eigen::Vector4d& at) const;
-  };
-  struct Climb {
-    ImageTerms terms;
-    Eigen::Vector4d steps;  // no rotation is looked for where psi's is 0
+    Eigen::Vector4d steps;               // no rotation is looked for where psi's is 0
     double score = 0;
     int halvings = 0, moves = 0;  // done; moves since the last halving
 
+    Climb(const Rigid3& rcm_frame, const PoseUnknowns& start, const Eigen::Vector4d& first_steps);
+    std::optional<PoseUnknowns> unknowns(const Eigen::Vector4d& at) const;
     bool with_rotation() const { return steps[3] > 0; }
   };
   struct Result {

@@ -7,11 +7,8 @@
 
 #include "lapservo/core/angles.h"
 #include "lapservo/testing/scenes.h"
-#include "lapservo/vision/search/explained_colours.h"
 
-namespace lapservo::internal {
-namespace agreement_search_test {
-namespace {
+namespace lapservo::internal::agreement_search_test {
 
 using scenes::Sight;
 
@@ -136,6 +133,4 @@ TEST(WorkBudget, AllowsTheFirstStepOrAllBeyondWhatIsLeft) {
   EXPECT_TRUE(budget.allows(1));
 }
 
-}  // namespace
-}  // namespace agreement_search_test
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::agreement_search_test

@@ -14,6 +14,9 @@ namespace lapservo::internal {
 /// another order, so those that were looked at are known by their place, which moves with them.
 class BlobWalk {
  public:
+  bool done = false;         ///< none is left
+  bool other_bands = false;  ///< Starts, of those that were looked at
+
   /// Those of this frame's blobs that were not looked at yet: first the one in which it stopped, then the largest.
   /// `reach_px`: no blob moves farther from frame to frame.
   std::vector<const Blob*> rest(const std::vector<Blob>& blobs, double reach_px);

@@ -8,7 +8,7 @@ namespace {
 constexpr double reach_px = 60;
 
 Blob blob_at(int u, int v) {
-  return {{{u - 8, v, 1}, {u + 8, v, 2}}, 8};
+  return {{{u - 8, v, 1}, {u + 8, v, 2}}};
 }
 
 TEST(BlobWalk, GoesOnByPlaceWhereTheOrderChanges) {

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include "lapservo/vision/decision/displaced_boundary.h"
 #include "lapservo/vision/decision/verification.h"
 #include "lapservo/vision/search/coarse_fit.h"
 #include "lapservo/vision/search/starts.h"
@@ -29,9 +28,9 @@ CoarseFit fitted_coarsely(const Scene& scene, const PoseUnknowns& start, Rotatio
   return fit;
 }
 
-FineFit fitted(const Scene& scene, const LightImage& light, const PoseUnknowns& start, const EdgeBlur& blur,
-               const Expected& processing, WorkBudget& budget) {
-  FineFit fit = fit_finely(scene, light, start, blur, processing);
+FineFit fitted(const Scene& scene, const LightImage& light, const PoseUnknowns& start, const Expected& expected,
+               WorkBudget& budget) {
+  FineFit fit = fit_finely(scene, light, start, expected);
   budget.spend(fit.passes * costs.fine_pass + (fit.converged ? costs.fine_end : 0) +
                fit.processing_explained * costs.processing + fit.asked_for_departure * costs.departure);
   return fit;
@@ -47,19 +46,19 @@ Found judged(const Scene& scene, const LightImage& light, FineFit fit, WorkBudge
   return status == Status::ok ? Found{status, std::move(fit), {}} : refusal(status, fit.unknowns);
 }
 
-Found fitted_from(const Scene& scene, const LightImage& light, const PoseUnknowns& start, const EdgeBlur& blur,
-                  const Expected& processing, WorkBudget& budget) {
-  return judged(scene, light, fitted(scene, light, start, blur, processing, budget), budget);
+Found fitted_from(const Scene& scene, const LightImage& light, const PoseUnknowns& start, const Expected& expected,
+                  WorkBudget& budget) {
+  return judged(scene, light, fitted(scene, light, start, expected, budget), budget);
 }
 
 Found try_start(const Scene& scene, const LightImage& light, const PoseUnknowns& start, WorkBudget& budget) {
   const CoarseFit coarse = fitted_coarsely(scene, start, Rotation::unknown, budget);
   if (!coarse.shows_rotation()) return {};
   if (coarse.has_rival()) return refusal(Status::ambiguous, coarse.unknowns);
-  FineFit fit = fitted(scene, light, coarse.unknowns, {}, {}, budget);
+  FineFit fit = fitted(scene, light, coarse.unknowns, {}, budget);
   if (!fit.converged)
     if (const CoarseFit nearer = fitted_coarsely(scene, coarse.unknowns, Rotation::known, budget); nearer.found)
-      fit = fitted(scene, light, nearer.unknowns, {}, {}, budget);
+      fit = fitted(scene, light, nearer.unknowns, {}, budget);
   return judged(scene, light, std::move(fit), budget);
 }
 
@@ -75,7 +74,7 @@ double reach_px(const SearchFrame& frame) {
 }
 
 double cost_of_starts(const SearchFrame& frame, bool through_rcm) {
-  return costs.starts_in_blob(through_rcm, !frame.scene.others.empty());
+  return (frame.scene.others.empty() ? 1 : 2) * (through_rcm ? costs.starts : costs.free_starts);
 }
 
 Starts starts_in(const SearchFrame& frame, bool through_rcm, const Blob& blob, WorkBudget& budget) {
@@ -86,20 +85,19 @@ Starts starts_in(const SearchFrame& frame, bool through_rcm, const Blob& blob, W
 }
 
 // The starts of one blob, until one fits. Rivals are all tried, in one frame.
-Found detect_in_blob(const SearchFrame& frame, bool through_rcm, const Blob& blob, SearchWalk& walk,
-                     WorkBudget& budget) {
+Found detect_in_blob(const SearchFrame& frame, bool through_rcm, const Blob& blob, BlobWalk& walk, WorkBudget& budget) {
   Found best;
   bool has_rivals = false;
-  const std::size_t first = walk.blobs.start();
+  const std::size_t first = walk.start();
   if (!budget.allows(cost_of_starts(frame, through_rcm) + costs.try_start())) {
-    walk.blobs.stop(blob, first);
+    walk.stop(blob, first);
     return best;
   }
   const auto [starts, rivals, other_bands] = starts_in(frame, through_rcm, blob, budget);
   walk.other_bands |= other_bands;
   for (std::size_t i = first; i < starts.size() && (i < rivals || !best.fit); ++i) {
     if (i > first && i >= rivals && !budget.allows(costs.try_start())) {
-      walk.blobs.stop(blob, i);
+      walk.stop(blob, i);
       return best;
     }
     Found found = try_start(frame.scene, frame.light, starts[i], budget);
@@ -112,20 +110,20 @@ Found detect_in_blob(const SearchFrame& frame, bool through_rcm, const Blob& blo
     has_rivals |= best.fit && are_rivals(*best.fit, *found.fit);
     if (!best.fit || found.fit->misfit() < best.fit->misfit()) best = std::move(found);
   }
-  walk.blobs.finish(blob);
+  walk.finish(blob);
   return has_rivals ? refusal(Status::ambiguous, best.fit->unknowns) : best;
 }
 
-Found detect(const SearchFrame& frame, bool through_rcm, SearchWalk& walk, WorkBudget& budget) {
+Found detect(const SearchFrame& frame, bool through_rcm, BlobWalk& walk, WorkBudget& budget) {
   Found best;
-  for (const Blob* blob : walk.blobs.rest(frame.blobs, reach_px(frame))) {
+  for (const Blob* blob : walk.rest(frame.blobs, reach_px(frame))) {
     Found found = detect_in_blob(frame, through_rcm, *blob, walk, budget);
     if (found.fit || found.status == Status::marker_mismatch) {
       walk.done = true;
       return found;
     }
     if (best.status == Status::no_marker) best = std::move(found);
-    if (walk.blobs.stopped()) return best;
+    if (walk.stopped()) return best;
   }
   walk.done = true;
   return best;
@@ -155,22 +153,21 @@ Rival look_for_rival(const SearchFrame& frame, const FineFit& fit, WorkBudget& b
 
 }  // namespace
 
-Found follow(const Scene& scene, const LightImage& light, const PoseUnknowns& expected, const EdgeBlur& blur,
-             const Expected& processing, WorkBudget& budget) {
-  Found near = fitted_from(scene, light, expected, blur, processing, budget);
+Found follow(const Scene& scene, const LightImage& light, const PoseUnknowns& start, const Expected& expected,
+             WorkBudget& budget) {
+  Found near = fitted_from(scene, light, start, expected, budget);
   if (near.fit || near.status == Status::marker_mismatch) return near;
-  if (const CoarseFit coarse = fitted_coarsely(scene, expected, Rotation::known, budget); coarse.found)
-    if (Found found = fitted_from(scene, light, coarse.unknowns, blur, processing, budget); found.fit) return found;
-  if (!scene.registration || !expected.through_rcm()) return near;
-  return fitted_from(scene, light, expected.with_rcm(false), blur, processing, budget);
+  if (const CoarseFit coarse = fitted_coarsely(scene, start, Rotation::known, budget); coarse.found)
+    if (Found found = fitted_from(scene, light, coarse.unknowns, expected, budget); found.fit) return found;
+  if (!scene.registration || !start.through_rcm()) return near;
+  return fitted_from(scene, light, start.with_rcm(false), expected, budget);
 }
 
 // The candidate as it shows in this frame; whether it doesn't.
 bool MarkerSearch::lost_candidate(const SearchFrame& frame, WorkBudget& budget) {
   const FineFit before = *candidate_;
-  candidate_ =
-      follow(frame.scene, frame.light, before.unknowns, before.blur, {true, before.bias_px, before.departure}, budget)
-          .fit;
+  const Expected expected{true, before.blur, before.bias_px, before.departure};
+  candidate_ = follow(frame.scene, frame.light, before.unknowns, expected, budget).fit;
   return !candidate_;
 }
 
@@ -213,29 +210,25 @@ Found MarkerSearch::despite_registration(const SearchFrame& frame, bool plain_is
   if (!free.fit || !free.fit->is_well_seen()) return {};
   if (plain_is_known) return free;
   // In this frame a fit through the RCM may be possible where none was before.
-  SearchWalk again;
+  BlobWalk again;
   budget.allow(WorkBudget::Beyond::all);
   Found through_rcm = detect(frame, true, again, budget);
   return through_rcm.fit ? through_rcm : free;
 }
 
-// False when the budget ends first.
-bool MarkerSearch::fit_to_results(const SearchFrame& frame, WorkBudget& budget) {
+// The climb, and fits to its results. False when the budget ends first.
+bool MarkerSearch::finish_agreement(const SearchFrame& frame, WorkBudget& budget) {
+  if (!agreement_->advance(frame.scene, budget)) return false;
   if (!results_) results_ = agreement_->results();
   for (; !results_->empty(); results_->pop_back()) {
     if (!budget.allows(costs.fit_to_result())) return false;
     const PoseUnknowns start = agreement_->in_this_frame(frame.scene, results_->back(), budget);
-    const Found found = fitted_from(frame.scene, frame.light, start, {}, {}, budget);
+    const Found found = fitted_from(frame.scene, frame.light, start, {}, budget);
     if (!found.fit) continue;
     has_rivals_ |= candidate_ && are_rivals(*candidate_, *found.fit);
     if (!candidate_ || found.fit->misfit() < candidate_->misfit()) candidate_ = found.fit;
   }
   results_.reset();
-  return true;
-}
-
-bool MarkerSearch::finish_agreement(const SearchFrame& frame, WorkBudget& budget) {
-  if (!agreement_->advance(frame.scene, budget) || !fit_to_results(frame, budget)) return false;
   agreement_.reset();
   return true;
 }
@@ -243,16 +236,16 @@ bool MarkerSearch::finish_agreement(const SearchFrame& frame, WorkBudget& budget
 // The best of all that the starts on lines through the RCM lead to.
 Found MarkerSearch::hidden(const SearchFrame& frame, WorkBudget& budget) {
   const std::vector<Blob> blobs = joined_blobs(frame.blobs);
-  const auto rest = hidden_.blobs.rest(blobs, reach_px(frame));
+  const auto rest = hidden_.rest(blobs, reach_px(frame));
   if (agreement_ && !finish_agreement(frame, budget)) return {};
   for (const Blob* blob : rest) {
     const auto starts = starts_in(frame, true, *blob, budget).poses;
-    for (std::size_t i = hidden_.blobs.start(); i < starts.size(); ++i) {
+    for (std::size_t i = hidden_.start(); i < starts.size(); ++i) {
       agreement_ = AgreementSearch(starts[i], frame.camera_from_rcm(), frame.scene.marker.length_m());
-      hidden_.blobs.stop(*blob, i + 1);
+      hidden_.stop(*blob, i + 1);
       if (!finish_agreement(frame, budget)) return {};
     }
-    hidden_.blobs.finish(*blob);
+    hidden_.finish(*blob);
   }
   hidden_.done = true;
   if (!candidate_) return {};
@@ -274,7 +267,7 @@ Found MarkerSearch::look_with_rcm(const SearchFrame& frame, WorkBudget& budget) 
   // The result of other blobs was worse than it, and is gone with it.
   if (candidate_ && lost_candidate(frame, budget))
     hidden_ = {}, agreement_.reset(), results_.reset(), has_rivals_ = false;
-  const bool from_the_first = !plain_.blobs.begun();
+  const bool from_the_first = !plain_.begun();
   const WorkBudget::Beyond step = budget.allowed();
   // Half the budget, or by turns what a start takes, is for what shows plainly.
   longs_turn_ = searches_long_ && !longs_turn_;

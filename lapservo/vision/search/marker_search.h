@@ -33,15 +33,8 @@ struct SearchFrame {
 };
 
 /// The marker near where it is expected, at last without regard to the registration.
-Found follow(const Scene& scene, const LightImage& light, const PoseUnknowns& expected, const EdgeBlur& blur,
-             const Expected& processing, WorkBudget& budget);
-
-/// A search from blob to blob; done when none is left.
-struct SearchWalk {
-  BlobWalk blobs;
-  bool done = false;
-  bool other_bands = false;  ///< Starts
-};
+Found follow(const Scene& scene, const LightImage& light, const PoseUnknowns& start, const Expected& expected,
+             WorkBudget& budget);
 
 /// Looks for one marker all over a frame: first for what shows plainly, of a well known RCM on lines through it, else
 /// by the blobs' outlines; of a well known RCM then without regard to it, and at last for markers that are hidden in
@@ -59,14 +52,13 @@ class MarkerSearch {
   Found despite_registration(const SearchFrame& frame, bool plain_is_known, WorkBudget& budget);
   Found hidden(const SearchFrame& frame, WorkBudget& budget);
   bool finish_agreement(const SearchFrame& frame, WorkBudget& budget);
-  bool fit_to_results(const SearchFrame& frame, WorkBudget& budget);
   bool lost_candidate(const SearchFrame& frame, WorkBudget& budget);
   void know(Found& plain);
   void begin_anew(Status status);
 
   Status status_ = Status::no_marker;  // of the last whole look at what shows plainly
   bool other_bands_ = false;           // that look saw bands which the marker has at no azimuth
-  SearchWalk plain_, free_, hidden_;
+  BlobWalk plain_, free_, hidden_;
   bool searches_long_ = false;  // what shows plainly was not found
   bool longs_turn_ = false;
   std::optional<AgreementSearch> agreement_;

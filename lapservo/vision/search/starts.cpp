@@ -35,9 +35,28 @@ struct RaysFromPole {
   }
 };
 
-// The part of the rays that a blob lies in.
+// A line's split into the bands, and how well it agrees [samples].
+struct Line {
+  LineSegmentation split;
+  double score = 0;
+  double length() const { return split.position[3] - split.position[0]; }
+};
+
+using Lines = std::vector<Line>;
+
+// Lines side by side that one shaft may show on.
+struct Window {
+  std::size_t middle = 0, first = 0, last = 0;  // lines
+  double score = 0;
+  bool has(std::size_t line) const { return line >= first && line <= last; }
+};
+
+// The part of the rays that a blob lies in, split into lines from the pole.
 struct Fan {
+  RaysFromPole rays;
   double first_alpha_rad, step_alpha_rad, first_beta_rad, step_beta_rad;
+  Lines lines{};
+  std::vector<Window> windows{};  // best first
   double alpha_rad(double line) const { return first_alpha_rad + line * step_alpha_rad; }
   double beta_rad(double sample) const { return first_beta_rad + sample * step_beta_rad; }
 };
@@ -83,24 +102,15 @@ std::optional<Fan> fan_over(const Scene& scene, const Blob& blob, const RaysFrom
   if (!may_be_in_order(bands)) return std::nullopt;
   const double first_beta = std::acos(std::min(1.0, most_cosine)), last_beta = std::acos(std::max(-1.0, least_cosine));
   const double alpha_margin_rad =
-      blob.grid_px / scene.camera.fx_px / std::max(least_sine, std::sin((first_beta + last_beta) / 2));
+      blob_grid_px / scene.camera.fx_px / std::max(least_sine, std::sin((first_beta + last_beta) / 2));
   const double beta_margin_rad = 0.2 * (last_beta - first_beta) + 0.01;
   const double first_alpha_rad = *alpha_rad + std::atan(least_tangent) - alpha_margin_rad;
   const double last_alpha_rad = *alpha_rad + std::atan(most_tangent) + alpha_margin_rad;
   const double from_rad = std::max(0.0, first_beta - beta_margin_rad);
   const double to_rad = std::min(pi, last_beta + beta_margin_rad);
-  return Fan{first_alpha_rad, (last_alpha_rad - first_alpha_rad) / static_cast<double>(lines - 1), from_rad,
+  return Fan{rays, first_alpha_rad, (last_alpha_rad - first_alpha_rad) / static_cast<double>(lines - 1), from_rad,
              (to_rad - from_rad) / line_samples};
 }
-
-// A line's split into the bands, and how well it agrees [samples].
-struct Line {
-  LineSegmentation split;
-  double score = 0;
-  double length() const { return split.position[3] - split.position[0]; }
-};
-
-using Lines = std::vector<Line>;
 
 // Cosine and sine of each sample's beta: all lines have the same.
 using Samples = std::array<Eigen::Vector2d, line_samples>;
@@ -125,23 +135,16 @@ Line line_at(const Scene& scene, const RaysFromPole& rays, double alpha_rad, con
   return line;
 }
 
-// Lines side by side that one shaft may show on.
-struct Window {
-  std::size_t middle = 0, first = 0, last = 0;  // lines
-  double score = 0;
-  bool has(std::size_t line) const { return line >= first && line <= last; }
-};
-
 // As wide as a marker is that looks as long as on the middle line.
-Window window_about(const Scene& scene, const Fan& fan, const Lines& lines, std::size_t middle) {
+Window window_about(const Scene& scene, const Fan& fan, std::size_t middle) {
   Window window{middle};
-  const Line& line = lines[middle];
+  const Line& line = fan.lines[middle];
   const double length_rad = line.length() * fan.step_beta_rad;
   const double beta_rad = fan.beta_rad((line.split.position[0] + line.split.position[3]) / 2);
   const double half_rad = 0.8 * scene.marker.radius_m() / scene.marker.length_m() * length_rad;
   const auto half = static_cast<std::size_t>(half_rad / std::max(least_sine, std::sin(beta_rad)) / fan.step_alpha_rad);
-  window.first = middle - std::min(middle, half), window.last = std::min(middle + half, lines.size() - 1);
-  for (std::size_t i = window.first; i <= window.last; ++i) window.score += lines[i].score;
+  window.first = middle - std::min(middle, half), window.last = std::min(middle + half, fan.lines.size() - 1);
+  for (std::size_t i = window.first; i <= window.last; ++i) window.score += fan.lines[i].score;
   return window;
 }
 
@@ -164,16 +167,16 @@ Window grown(Window window, const Lines& lines) {
   return window;
 }
 
-std::vector<Window> best_windows(const Scene& scene, const Fan& fan, const Lines& lines) {
+std::vector<Window> best_windows(const Scene& scene, const Fan& fan) {
   constexpr double least = 0.3;  // of the best
   std::vector<Window> all, best;
-  for (std::size_t i = 0; i < lines.size(); ++i)
-    if (lines[i].score > 0) all.push_back(window_about(scene, fan, lines, i));
+  for (std::size_t i = 0; i < fan.lines.size(); ++i)
+    if (fan.lines[i].score > 0) all.push_back(window_about(scene, fan, i));
   std::sort(all.begin(), all.end(), [](const Window& a, const Window& b) { return a.score > b.score; });
   for (const Window& window : all) {
     if (best.size() == most_starts || window.score < least * all[0].score) break;
     if (std::none_of(best.begin(), best.end(), [&](const Window& other) { return other.has(window.middle); }))
-      best.push_back(grown(window, lines));
+      best.push_back(grown(window, fan.lines));
   }
   return best;
 }
@@ -209,22 +212,14 @@ bool is_hidden(const Scene& scene, const RaysFromPole& rays, double alpha_rad, d
   constexpr int places = 5;
   int hidden = 0;
   for (int i = 0; i < places; ++i) {
-    const Eigen::Vector3d ray =
-        rays.ray(alpha_rad, first_beta_rad + (last_beta_rad - first_beta_rad) * (i + 0.5) / places);
-    hidden += class_on_ray(scene, ray) == Scene::outside;
+    const double beta_rad = first_beta_rad + (last_beta_rad - first_beta_rad) * (i + 0.5) / places;
+    hidden += class_on_ray(scene, rays.ray(alpha_rad, beta_rad)) == Scene::outside;
   }
   return 2 * hidden > places;
 }
 
-struct SplitFan {
-  RaysFromPole rays;
-  Fan fan;
-  Lines lines;
-  std::vector<Window> windows;  // best first
-};
-
-Extent extent_of(const Scene& scene, const SplitFan& split, const Window& window) {
-  const auto& [rays, fan, lines, windows] = split;
+Extent extent_of(const Scene& scene, const Fan& fan, const Window& window) {
+  const Lines& lines = fan.lines;
   const double most = most_score(lines, window);
   std::vector<double> first, last;
   double sum = 0, lowest = static_cast<double>(lines.size()), highest = 0;
@@ -238,7 +233,7 @@ Extent extent_of(const Scene& scene, const SplitFan& split, const Window& window
     if (lines[i].split.seen[0]) first.push_back(fan.beta_rad(lines[i].split.position[0]));
     if (lines[i].split.seen[3]) last.push_back(fan.beta_rad(lines[i].split.position[3]));
   }
-  Extent extent{rays, fan.alpha_rad(sum / count), 0, agreed_end(first), agreed_end(last)};
+  Extent extent{fan.rays, fan.alpha_rad(sum / count), 0, agreed_end(first), agreed_end(last)};
   constexpr double most_of_them = 0.75;
   extent.other_bands = with_other_bands > most_of_them * count;
   const Line& middle = lines[window.middle];
@@ -246,8 +241,8 @@ Extent extent_of(const Scene& scene, const SplitFan& split, const Window& window
   extent.sine_of_beta = std::sin((from_rad + to_rad) / 2);
   extent.width_rad = (highest - lowest + 1) * fan.step_alpha_rad * extent.sine_of_beta;
   const double low_rad = fan.alpha_rad(lowest - 1), high_rad = fan.alpha_rad(highest + 1);
-  const bool low_hidden = is_hidden(scene, rays, low_rad, from_rad, to_rad);
-  if (low_hidden == is_hidden(scene, rays, high_rad, from_rad, to_rad)) return extent;
+  const bool low_hidden = is_hidden(scene, fan.rays, low_rad, from_rad, to_rad);
+  if (low_hidden == is_hidden(scene, fan.rays, high_rad, from_rad, to_rad)) return extent;
   extent.only_side_rad = low_hidden ? high_rad : low_rad, extent.away_from_side = low_hidden ? -1 : 1;
   return extent;
 }
@@ -286,14 +281,10 @@ double distance_of(const Scene& scene, const Extent& extent, double first_beta_r
 }
 
 std::optional<PoseUnknowns> start_through_rcm(const Scene& scene, const Extent& extent, const Rigid3& camera_from_rcm) {
-  const double rcm_m = camera_from_rcm.translation.norm();
-  double first_beta_rad = extent.first_beta_rad.value_or(0);
-  if (!extent.first_beta_rad) {
-    // Seen squarely.
-    const double distance_m = distance_of(scene, extent, 0, rcm_m);
-    first_beta_rad = *extent.last_beta_rad - scene.marker.length_m() / distance_m;
-  }
-  const double distance_m = distance_of(scene, extent, first_beta_rad, rcm_m);
+  const double seen_squarely_rad = scene.marker.length_m() / distance_by_width_m(scene, extent);
+  const double first_beta_rad =
+      extent.first_beta_rad ? *extent.first_beta_rad : *extent.last_beta_rad - seen_squarely_rad;
+  const double distance_m = distance_of(scene, extent, first_beta_rad, camera_from_rcm.translation.norm());
   const double alpha_rad = alpha_of_axis(scene, extent, distance_m);
   const auto q = configuration_through(camera_from_rcm, distance_m * extent.rays.ray(alpha_rad, first_beta_rad));
   return q ? std::optional(PoseUnknowns(pose_through_rcm(camera_from_rcm, *q), true)) : std::nullopt;
@@ -319,39 +310,37 @@ void add_free_starts(const Scene& scene, const Extent& extent, double distance_m
   }
 }
 
-std::optional<SplitFan> split_fan(const Scene& scene, const Blob& blob, const Eigen::Vector3d& pole,
-                                  std::size_t lines = line_count) {
-  const RaysFromPole rays{pole};
-  const auto fan = fan_over(scene, blob, rays, lines);
+std::optional<Fan> split_fan(const Scene& scene, const Blob& blob, const Eigen::Vector3d& pole,
+                             std::size_t lines = line_count) {
+  auto fan = fan_over(scene, blob, RaysFromPole{pole}, lines);
   if (!fan) return std::nullopt;
-  SplitFan split{rays, *fan, {}, {}};
   Samples samples;
   for (std::size_t k = 0; k < line_samples; ++k) {
     const double beta_rad = fan->beta_rad(static_cast<double>(k) + 0.5);
     samples[k] = {std::cos(beta_rad), std::sin(beta_rad)};
   }
   for (std::size_t i = 0; i < lines; ++i)
-    split.lines.push_back(line_at(scene, rays, fan->alpha_rad(static_cast<double>(i)), samples));
-  split.windows = best_windows(scene, *fan, split.lines);
-  return split;
+    fan->lines.push_back(line_at(scene, fan->rays, fan->alpha_rad(static_cast<double>(i)), samples));
+  fan->windows = best_windows(scene, *fan);
+  return fan;
 }
 
 // The pole of lines along the shaft by a fan of lines that are nearly: a marker's ends are square to its axis.
-Eigen::Vector3d turned_pole(const SplitFan& split) {
+Eigen::Vector3d turned_pole(const Fan& fan) {
   constexpr std::size_t least_apart = 2;
-  const Window& window = split.windows.front();
+  const Window& window = fan.windows.front();
   std::vector<double> slopes;
   for (const std::size_t end : {0, 3})
     for (std::size_t i = window.first; i <= window.last; ++i)
       for (std::size_t j = i + least_apart; j <= window.last; ++j) {
-        const LineSegmentation &a = split.lines[i].split, &b = split.lines[j].split;
+        const LineSegmentation &a = fan.lines[i].split, &b = fan.lines[j].split;
         if (a.seen[end] && b.seen[end])
           slopes.push_back((b.position[end] - a.position[end]) / static_cast<double>(j - i));
       }
-  if (slopes.empty()) return split.rays.pole;
-  const double turn_rad = std::atan(median(slopes) * split.fan.step_beta_rad / split.fan.step_alpha_rad);
-  const Eigen::Vector3d aside = split.rays.across(split.fan.alpha_rad(static_cast<double>(window.middle)) + pi / 2);
-  return std::cos(turn_rad) * split.rays.pole + std::sin(turn_rad) * aside;
+  if (slopes.empty()) return fan.rays.pole;
+  const double turn_rad = std::atan(median(slopes) * fan.step_beta_rad / fan.step_alpha_rad);
+  const Eigen::Vector3d aside = fan.rays.across(fan.alpha_rad(static_cast<double>(window.middle)) + pi / 2);
+  return std::cos(turn_rad) * fan.rays.pole + std::sin(turn_rad) * aside;
 }
 
 // Where a blob spreads most, across the line of sight; nullopt where it shows nothing of the marker's colours.
@@ -373,9 +362,9 @@ std::optional<Eigen::Vector3d> long_direction(const Scene& scene, const Blob& bl
   return (direction - direction.dot(middle) / middle.squaredNorm() * middle).normalized();
 }
 
-void add_extents(const Scene& scene, const SplitFan& split, std::vector<Extent>& extents) {
-  for (const Window& window : split.windows) {
-    const Extent extent = extent_of(scene, split, window);
+void add_extents(const Scene& scene, const Fan& fan, std::vector<Extent>& extents) {
+  for (const Window& window : fan.windows) {
+    const Extent extent = extent_of(scene, fan, window);
     if (extent.first_beta_rad || extent.last_beta_rad) extents.push_back(extent);
   }
 }
@@ -384,16 +373,16 @@ void add_extents(const Scene& scene, const Blob& blob, const std::optional<Rigid
                  std::vector<Extent>& extents) {
   if (camera_from_rcm) {
     if (!(camera_from_rcm->translation.norm() > LensField::nearest_m)) return;
-    if (const auto split = split_fan(scene, blob, camera_from_rcm->translation.normalized()))
-      add_extents(scene, *split, extents);
+    if (const auto fan = split_fan(scene, blob, camera_from_rcm->translation.normalized()))
+      add_extents(scene, *fan, extents);
     return;
   }
   const auto direction = long_direction(scene, blob);
   if (!direction) return;
   for (const Eigen::Vector3d& pole : {*direction, Eigen::Vector3d(-*direction)}) {
-    auto split = split_fan(scene, blob, pole, few_lines);
-    if (split && !split->windows.empty()) split = split_fan(scene, blob, turned_pole(*split));
-    if (split) add_extents(scene, *split, extents);
+    auto fan = split_fan(scene, blob, pole, few_lines);
+    if (fan && !fan->windows.empty()) fan = split_fan(scene, blob, turned_pole(*fan));
+    if (fan) add_extents(scene, *fan, extents);
   }
 }
 
@@ -410,8 +399,8 @@ Starts starts_in(const Scene& scene, const Blob& blob, const std::optional<Rigid
   Starts starts;
   for (const Extent& extent : extents) {
     starts.other_bands |= extent.other_bands;
-    if (!camera_from_rcm) continue;
-    if (auto start = start_through_rcm(scene, extent, *camera_from_rcm)) starts.poses.push_back(*start);
+    if (camera_from_rcm)
+      if (auto start = start_through_rcm(scene, extent, *camera_from_rcm)) starts.poses.push_back(*start);
   }
   if (camera_from_rcm) return starts;
   for (const double scale : {1.0, nearer_scale}) {

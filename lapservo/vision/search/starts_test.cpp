@@ -8,11 +8,9 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/testing/shots.h"
-#include "lapservo/vision/search/explained_colours.h"
+#include "lapservo/vision/search/agreement_search.h"
 
-namespace lapservo::internal {
-namespace starts_test {
-namespace {
+namespace lapservo::internal::starts_test {
 
 using scenes::Shot;
 
@@ -40,22 +38,14 @@ Blob largest_blob(const Shot& shot) {
   return largest_blobs(shot.sight.view(), shot.sight.classes()).at(0);
 }
 
-TEST(Starts, ABlobTellsThePose) {
+TEST(Starts, ABlobTellsThePoseAndSoDoLinesThroughTheRcm) {
   scenes::for_each_shot(shots, [](const Shot& shot) {
-    const Starts free = starts_in(shot.sight.scene(), largest_blob(shot), std::nullopt);
-    EXPECT_TRUE(any_is_near(shot, free.poses));
-    for (const PoseUnknowns& start : free.poses) EXPECT_FALSE(start.through_rcm());
-    EXPECT_FALSE(free.other_bands);
-  });
-}
-
-TEST(Starts, LinesThroughTheRcmTellThePose) {
-  scenes::for_each_shot(shots, [](const Shot& shot) {
-    const auto starts =
-        starts_in(shot.sight.scene(), largest_blob(shot), shot.rig.instruments[0].camera_from_rcm).poses;
-    EXPECT_LE(starts.size(), 3U);
-    EXPECT_TRUE(any_is_near(shot, starts));
-    for (const PoseUnknowns& start : starts) EXPECT_TRUE(start.through_rcm());
+    for (const auto& rcm : {shot.rig.instruments[0].camera_from_rcm, std::optional<Rigid3>()}) {
+      const Starts starts = starts_in(shot.sight.scene(), largest_blob(shot), rcm);
+      EXPECT_TRUE(any_is_near(shot, starts.poses));
+      for (const PoseUnknowns& start : starts.poses) EXPECT_EQ(start.through_rcm(), rcm.has_value());
+      EXPECT_TRUE(rcm ? starts.poses.size() <= 3 : !starts.other_bands);
+    }
   });
 }
 
@@ -84,7 +74,7 @@ TEST(Starts, ASideBeyondTheBorderIsADiameterFromTheOther) {
 
 // Another instrument's colours are in another order; other things have one colour.
 TEST(Starts, AreNoneWithoutTheMarkersColoursInTheirOrder) {
-  Blob of_one_colour{{}, 8};
+  Blob of_one_colour;
   for (int i = 0; i < 30; ++i) of_one_colour.samples.push_back({300 + 8 * (i % 6), 200 + 8 * (i / 6), 1});
   scenes::for_each_shot(shots, [&](const Shot& shot) {
     Scene another = shot.sight.scene();
@@ -96,24 +86,4 @@ TEST(Starts, AreNoneWithoutTheMarkersColoursInTheirOrder) {
   });
 }
 
-TEST(ExplainedColours, AreMostByFarAtTheTruthWhereNothingIsHidden) {
-  scenes::for_each_shot(shots, [](const Shot& shot) {
-    const Scene scene = shot.sight.scene();
-    const PoseUnknowns truth = shot.truth(true);
-    const double of_truth_px2 = explained_area_px2(scene, truth.pose(), true);
-    for (const Eigen::Vector4d& off :
-         {Eigen::Vector4d(0, 0, 0, 1), Eigen::Vector4d(0, 0, 0, -2), Eigen::Vector4d(0, 0, 6e-3, 0),
-          Eigen::Vector4d(0, 0, -6e-3, 0), Eigen::Vector4d(0.05, 0, 0, 0), Eigen::Vector4d(0, 0.05, 0, 0)})
-      EXPECT_LT(explained_area_px2(scene, scenes::pose_of(shot.rig, 0, JointVector::from_vector(shot.q.vector() + off)),
-                                   true),
-                0.9 * of_truth_px2)
-          << off.transpose();
-    // A turn is nothing where any rotation counts, and what can't be enough is not counted to the end.
-    EXPECT_GT(explained_area_px2(scene, truth.with_psi(shot.q.psi_rad + 1).pose(), false), 0.5 * of_truth_px2);
-    EXPECT_EQ(explained_area_px2(scene, truth.pose(), true, 2 * of_truth_px2), no_area_px2);
-  });
-}
-
-}  // namespace
-}  // namespace starts_test
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::starts_test

@@ -61,9 +61,6 @@ struct SearchCosts {
   double blobs_per_px = 2.2e-4;
   double part_beside = 0.6;  ///< of the budget where every sample is tested for another instrument that hides it
   double cover = 1300;       ///< where one instrument lies, for who looks for another beside or behind it
-  double starts_in_blob(bool through_rcm, bool beside_others) const {
-    return (beside_others ? 2 : 1) * (through_rcm ? starts : free_starts);
-  }
   double fine_fit() const { return 3 * fine_pass + fine_end; }
   double try_start() const { return coarse_fit + fine_fit(); }
   double fit_to_result() const { return 150 * agreement + fine_fit(); }

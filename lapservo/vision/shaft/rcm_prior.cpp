@@ -39,7 +39,7 @@ bool RcmPrior::is_within(double radius_m) const {
   return std::sqrt(covariance.topLeftCorner<3, 3>().trace()) < radius_m;
 }
 
-std::optional<ConfigurationEstimate> configuration_estimate(
+std::optional<Observation::Rcm> configuration_estimate(
     const PoseUnknowns& unknowns, const PoseMatrix& covariance, const RcmPrior& registration,
     const Eigen::Matrix<double, pose_unknowns, 6>& pose_by_registration) {
   const auto q = configuration_of(unknowns.pose(), registration.camera_from_rcm);
@@ -54,8 +54,8 @@ std::optional<ConfigurationEstimate> configuration_estimate(
       registration.camera_from_rcm, *q,
       [&](const Rigid3& camera_from_rcm) { return configuration_of(unknowns.pose(), camera_from_rcm); });
   const Eigen::Matrix4d both = by_pose * pose_by_registration * slopes.transpose();
-  return ConfigurationEstimate{*q, by_pose * covariance * by_pose.transpose() + both + both.transpose() +
-                                       slopes * registration.covariance * slopes.transpose()};
+  return Observation::Rcm{*q, by_pose * covariance * by_pose.transpose() + both + both.transpose() +
+                                  slopes * registration.covariance * slopes.transpose()};
 }
 
 }  // namespace lapservo::internal

@@ -6,6 +6,7 @@
 
 #include "lapservo/geometry/rotation.h"
 #include "lapservo/rig/rig.h"
+#include "lapservo/vision/observation.h"
 #include "lapservo/vision/shaft/shaft_pose.h"
 
 namespace lapservo::internal {
@@ -61,15 +62,9 @@ Eigen::Matrix<double, 4, 6> by_registration(const Rigid3& camera_from_rcm, const
   return slopes;
 }
 
-/// q by a pose and a registration, and how sure it is by both, in the order theta, phi, rho, psi; to first order.
-struct ConfigurationEstimate {
-  JointVector q;
-  Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
-};
-
-/// `pose_by_registration`: covariance of the pose's unknowns with the registration's numbers. Nullopt where the pose
-/// has no q.
-std::optional<ConfigurationEstimate> configuration_estimate(
+/// q by a pose and a registration, and how sure it is by both; to first order. `pose_by_registration`: covariance of
+/// the pose's unknowns with the registration's numbers. Nullopt where the pose has no q.
+std::optional<Observation::Rcm> configuration_estimate(
     const PoseUnknowns& unknowns, const PoseMatrix& covariance, const RcmPrior& registration,
     const Eigen::Matrix<double, pose_unknowns, 6>& pose_by_registration);
 

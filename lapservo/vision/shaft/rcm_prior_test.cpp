@@ -1,14 +1,13 @@
 #include "lapservo/vision/shaft/rcm_prior.h"
 
 #include <cmath>
-#include <string>
 
 #include <Eigen/Cholesky>
 #include <gtest/gtest.h>
 
 #include "lapservo/core/angles.h"
-#include "lapservo/core/random.h"
 #include "lapservo/geometry/rotation.h"
+#include "lapservo/testing/seeded_random.h"
 
 namespace lapservo::internal {
 namespace {
@@ -43,8 +42,7 @@ struct Scene {
 
 TEST(RcmPrior, AShaftThroughTheRcmDoesNotMissItAndRowsAreTheDerivativesOfWhatOthersDo) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
-    SCOPED_TRACE("seed " + std::to_string(seed));
-    Random random(seed);
+    testing::SeededRandom random(seed);
     const Scene scene(random);
     constexpr double least_m = 1e-4, step = 1e-7;
     const RcmMeasurement at = scene.registration.of(scene.unknowns.pose(), least_m);
@@ -119,8 +117,7 @@ TEST(ConfigurationEstimate, HasTheSpreadOfWhatIsDrawn) {
     const Rigid3 off{rotation_by(error.tail<3>()) * exact.rotation, exact.translation + error.segment<3>(6)};
     const auto q = configuration_of(scene.unknowns.changed_by(error.head<6>()).pose(), off);
     ASSERT_TRUE(q);
-    Eigen::Vector4d change = q->vector() - scene.q.vector();
-    for (const Eigen::Index angle : {0, 1, 3}) change[angle] = wrap_pi(change[angle]);
+    const Eigen::Vector4d change = configuration_change(scene.q, *q);
     squares += change * change.transpose() / draws;
   }
   for (Eigen::Index i = 0; i < 4; ++i) EXPECT_NEAR(std::sqrt(squares(i, i) / estimate->covariance(i, i)), 1, 0.05) << i;

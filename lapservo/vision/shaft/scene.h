@@ -1,20 +1,33 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <bitset>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 
+#include "lapservo/core/angles.h"
 #include "lapservo/geometry/camera.h"
 #include "lapservo/marker/marker.h"
 #include "lapservo/vision/colour/colour_classes.h"
 #include "lapservo/vision/image/image_view.h"
 #include "lapservo/vision/image/lens_field.h"
 #include "lapservo/vision/observation.h"
-#include "lapservo/vision/shaft/print_sides.h"
 #include "lapservo/vision/shaft/rcm_prior.h"
 #include "lapservo/vision/shaft/shaft_cover.h"
 
 namespace lapservo::internal {
+
+/// Sides from which a print is seen: 15 degrees of tau each.
+inline constexpr std::size_t print_sides = 24;
+using PrintSides = std::bitset<print_sides>;
+
+/// That of a generatrix which faces the camera; any angle.
+inline std::size_t print_side(double tau_rad) {
+  const auto side = static_cast<std::size_t>(wrap_two_pi(tau_rad) / two_pi * static_cast<double>(print_sides));
+  return std::min(side, print_sides - 1);
+}
 
 /// One frame and the one instrument that is looked for in it. Borrows everything.
 struct Scene {
@@ -31,11 +44,15 @@ struct Scene {
 
   /// Where the image says nothing of this instrument: beyond its border, or since another one shows there.
   static constexpr std::uint8_t outside = 255;
-  /// Colour class of the nearest pixel, `outside` beyond the image.
-  std::uint8_t class_at(const Eigen::Vector2d& raw_px) const {
+  /// The nearest pixel, nullptr beyond the image; and its colour class, `outside` there.
+  const std::uint8_t* pixel_at(const Eigen::Vector2d& raw_px) const {
     const double u = raw_px.x() + 0.5, v = raw_px.y() + 0.5;
-    if (!(u >= 0 && v >= 0 && u < image.width_px && v < image.height_px)) return outside;
-    return classes(image.pixel(static_cast<int>(u), static_cast<int>(v)));
+    const bool is_inside = u >= 0 && v >= 0 && u < image.width_px && v < image.height_px;
+    return is_inside ? image.pixel(static_cast<int>(u), static_cast<int>(v)) : nullptr;
+  }
+  std::uint8_t class_at(const Eigen::Vector2d& raw_px) const {
+    const std::uint8_t* const bgr = pixel_at(raw_px);
+    return bgr ? classes(bgr) : outside;
   }
   /// The same, and `outside` where another instrument's marker shows.
   std::uint8_t class_beside(const Eigen::Vector2d& raw_px) const {

@@ -181,7 +181,7 @@ bool lies_beside(const Camera& camera, const Marker& others_marker, const ShaftP
     const double away_px = distance_px(*shaft, place_px);
     if (away_px > radius_px + beside_px) continue;
     const double at = (place_px - marked->from_px).dot(along_px) / (length_px * length_px);
-    const bool explained = at > -doubt && at < 1 + doubt && away_px < radius_px + blob.grid_px / 2.0;
+    const bool explained = at > -doubt && at < 1 + doubt && away_px < radius_px + blob_grid_px / 2.0;
     samples += !explained;
   }
   return samples >= min_blob_samples;

@@ -15,12 +15,6 @@ std::optional<double> facing_tau_rad(const Marker& marker, const ShaftPose& pose
   return wrap_two_pi(marker_azimuth_rad(marker, view->facing_azimuth_rad, pose.psi_rad));
 }
 
-ShaftPose in_azimuths_of(const ShaftPose& pose, double psi_rad) {
-  const Rigid3& from = pose.camera_from_unrolled;
-  const Eigen::AngleAxisd turn(pose.psi_rad - psi_rad, Eigen::Vector3d::UnitZ());
-  return {{(from.rotation * turn).normalized(), from.translation}, psi_rad};
-}
-
 ShaftPose pose_through_rcm(const Rigid3& camera_from_rcm, const JointVector& q) {
   return {camera_from_rcm * rcm_from_unrolled(q), q.psi_rad};
 }

@@ -30,9 +30,6 @@ inline Eigen::Vector3d point_on(const ShaftPose& pose, const Marker& marker, dou
 /// shaft.
 std::optional<double> facing_tau_rad(const Marker& marker, const ShaftPose& pose);
 
-/// The same pose in the unrolled frame of another turn about the axis, in which psi is this.
-ShaftPose in_azimuths_of(const ShaftPose& pose, double psi_rad);
-
 /// For the shaft through the RCM.
 ShaftPose pose_through_rcm(const Rigid3& camera_from_rcm, const JointVector& q);
 

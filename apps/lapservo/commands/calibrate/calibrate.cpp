@@ -2,7 +2,7 @@
 
 namespace lapservo::app {
 
-void add_calibrate(Command app, Run& run_later) {
+void add_calibrate(Command app) {
   Command calibrate = app.add_subcommand("calibrate", "Measure what a rig says, and write it down.");
   calibrate.require_subcommand();
   calibrate.footer(
@@ -13,12 +13,12 @@ void add_calibrate(Command app, Run& run_later) {
       "  lapservo calibrate marker turn.mp4 --rig rig.yaml --out rig.yaml\n"
       "  lapservo calibrate registration swing.mp4 --joints joints.csv --rig rig.yaml --out rig.yaml\n"
       "  lapservo calibrate tip --pivot pivot.mp4 --rig rig.yaml --out rig.yaml");
-  add_calibrate_all(calibrate, run_later);
-  add_calibrate_camera(calibrate, run_later);
-  add_calibrate_colour(calibrate, run_later);
-  add_calibrate_marker(calibrate, run_later);
-  add_calibrate_registration(calibrate, run_later);
-  add_calibrate_tip(calibrate, run_later);
+  add_calibrate_all(calibrate);
+  add_calibrate_camera(calibrate);
+  add_calibrate_colour(calibrate);
+  add_calibrate_marker(calibrate);
+  add_calibrate_registration(calibrate);
+  add_calibrate_tip(calibrate);
 }
 
 }  // namespace lapservo::app

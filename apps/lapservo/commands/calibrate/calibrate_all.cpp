@@ -4,7 +4,6 @@
 #include <filesystem>
 #include <functional>
 #include <iostream>
-#include <memory>
 #include <optional>
 #include <string>
 #include <system_error>
@@ -12,11 +11,12 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 
 #include "apps/lapservo/cli/interrupt.h"
 #include "apps/lapservo/cli/subcommands.h"
-#include "apps/lapservo/commands/calibrate/calibrate_steps.h"
+#include "apps/lapservo/commands/calibrate/calibrate_inputs.h"
 #include "apps/lapservo/inputs/input_files.h"
 #include "apps/lapservo/inputs/joint_input.h"
 #include "lapservo/core/error.h"
@@ -70,26 +70,11 @@ std::string command_line(const std::vector<std::string>& arguments) {
   return text;
 }
 
-std::string now_utc() {
-  const std::time_t now = std::time(nullptr);
-  std::tm utc{};
-  gmtime_r(&now, &utc);
-  char text[32];
-  std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &utc);
-  return text;
-}
-
 std::string answer_to(const std::string& question) {
   std::fprintf(stderr, "%s? ", question.c_str());
   std::string answer;
   if (!std::getline(std::cin, answer)) return {};
   return answer;
-}
-
-// Empty: leave the step out.
-std::string asked(const Step& step) {
-  return answer_to(fmt::format("\n{}: {}\n  where is it (a folder, a video, a bag; empty: leave this step out)",
-                               step.name, step.what_to_record));
 }
 
 bool asks(const AllOptions& options) {
@@ -151,13 +136,7 @@ class Guide {
     return {
         {"camera", "12 or more images of a chessboard: near, sharp, tilted to all sides, in every part of the image",
          &o.boards, "--boards", "", board, [this](const auto& options) { return run_camera(options); }},
-        {"colour",
-         "the mounted marker moved through the image, 10 s",
-         &o.motion,
-         "--motion",
-         "",
-         {},
-         [](const auto& options) { return calibrate_colour({options}); }},
+        {"colour", "the mounted marker moved through the image, 10 s", &o.motion, "--motion", "", {}, calibrate_colour},
         {"marker", to_record_turn, &o.turn, "--turn", "", {}, calibrate_marker},
         {"registration", to_record_swing, &o.swing, "--swing", "", {}, calibrate_registration},
         {"check", "another swing, or the same, with a full turn", &o.judged, "--check", o.judged_joints, {}, check}};
@@ -241,7 +220,10 @@ class Guide {
 
   int take(Step& step) {
     const bool ask = step.input->empty() && asks(options_);
-    if (ask) *step.input = asked(step);
+    if (ask)
+      *step.input =
+          answer_to(fmt::format("\n{}: {}\n  where is it (a folder, a video, a bag; empty: leave this step out)",
+                                step.name, step.what_to_record));
     find_joints(step, ask);
     expect_redone(step);
     const CalibrationStep* done = record_.find(step.name);
@@ -253,7 +235,8 @@ class Guide {
     expect_recording(step);
     if (step.name == "camera" && (options_.board.empty() || !options_.square_mm))
       throw InputError("--boards", "needs --board and --square-mm, for example --board 9x6 --square-mm 5");
-    const CalibrationStep now{step.name, command_line(arguments_of(step)), state_of(step), now_utc()};
+    const CalibrationStep now{step.name, command_line(arguments_of(step)), state_of(step),
+                              fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)))};
     const std::string page = options_of(step).report;
     const bool has_page = page.empty() || fs::exists(page);
     if (done && options_.redo != step.name && done->command == now.command && done->inputs == now.inputs && has_page)
@@ -348,43 +331,40 @@ int run_all(AllOptions options) {
 
 }  // namespace
 
-void add_calibrate_all(Command parent, Run& run_later) {
-  auto options = std::make_shared<AllOptions>();
-  Command command = parent.add_subcommand(
-      "all", "The guided way: camera, colour, marker, registration, check, each where it is not done yet.");
-  command.add_option("--rig", options->rig, "The rig as it is known so far; each step replaces it").required();
-  command.add_option("--boards", options->boards, "For the camera: images of a chessboard");
-  command.add_option("--board", options->board, "Its inner corners, COLUMNSxROWS, for example 9x6");
-  command.add_option("--square-mm", options->square_mm, "Width of its squares").number_between(0.1, 1000.0);
-  command.add_option("--aruco", options->aruco, "For a ChArUco board: its markers' dictionary");
-  command.add_option("--motion", options->motion, "For the colours: the marker in motion; else --swing, else --turn");
-  command.add_option("--turn", options->turn,
-                     "For the marker: a slow full turn about the shaft's axis, there and back");
-  command.add_option("--swing", options->swing, "For the registration: a smooth swing");
-  command.add_option("--joints", options->joints, "CSV of the joints meanwhile");
-  command.add_option("--check", options->judged, "For the check: a recording; else --swing");
-  command.add_option("--check-joints", options->judged_joints,
+void add_calibrate_all(Command parent) {
+  auto [command, options] = parent.add_subcommand<AllOptions>(
+      "all", "The guided way: camera, colour, marker, registration, check, each where it is not done yet.", run_all);
+  command.add_option("--rig", options.rig, required(), "The rig as it is known so far; each step replaces it");
+  command.add_option("--boards", options.boards, "For the camera: images of a chessboard");
+  command.add_option("--board", options.board, "Its inner corners, COLUMNSxROWS, for example 9x6");
+  command.add_option("--square-mm", options.square_mm, between(0.1, 1000.0), "Width of its squares");
+  command.add_option("--aruco", options.aruco, "For a ChArUco board: its markers' dictionary");
+  command.add_option("--motion", options.motion, "For the colours: the marker in motion; else --swing, else --turn");
+  command.add_option("--turn", options.turn, "For the marker: a slow full turn about the shaft's axis, there and back");
+  command.add_option("--swing", options.swing, "For the registration: a smooth swing");
+  command.add_option("--joints", options.joints, "CSV of the joints meanwhile");
+  command.add_option("--check", options.judged, "For the check: a recording; else --swing");
+  command.add_option("--check-joints", options.judged_joints,
                      "CSV of the joints meanwhile; else, without --check, --joints");
   command.add_option(
-      "--camera", options->camera,
+      "--camera", options.camera,
       "A live system's images, as `lapservo record` takes them: what is missing of --turn and --swing is "
       "recorded into RIG.recordings; delete it to have it recorded anew");
-  command.add_option("--robot", options->robot, "and its arm: ros2:PSM1 or ros1:PSM1");
+  command.add_option("--robot", options.robot, "and its arm: ros2:PSM1 or ros1:PSM1");
   command.add_flag(
-      "--enable-motion", options->enable_motion,
+      "--enable-motion", options.enable_motion,
       "Move the arm for these recordings, see `lapservo record --move`; else a person does, guided by questions");
-  command.add_option("--joint-limits", options->joint_limits, "For --enable-motion: YAML of the arm's joints");
-  command.add_option("--report", options->report, "The check's HTML page with figures");
-  command.add_option("--instrument", options->instrument, "Its name, where the rig has several");
-  add_image_topic_option(command, options->image_topic);
-  add_joint_topic_option(command, options->joint_topic);
-  add_video_options(command, *options);
-  command.add_flag("--deinterlace", options->deinterlace, "For interlaced video: measure the field of the even rows");
-  command.add_option("--fps", options->fps, "Frames per second of folders of images").number_between(0.001, 1000.0);
-  command.add_option("--redo", options->redo, "A step that is done again though it was done, with those after it")
-      .one_of({"camera", "colour", "marker", "registration", "check"});
-  command.add_flag("--no-questions", options->no_questions,
-                   "Leave out what no option names; a terminal prompts for it");
+  command.add_option("--joint-limits", options.joint_limits, "For --enable-motion: YAML of the arm's joints");
+  command.add_option("--report", options.report, "The check's HTML page with figures");
+  command.add_option("--instrument", options.instrument, "Its name, where the rig has several");
+  add_image_topic_option(command, options.image_topic);
+  add_joint_topic_option(command, options.joint_topic);
+  add_video_options(command, options);
+  command.add_flag("--deinterlace", options.deinterlace, "For interlaced video: measure the field of the even rows");
+  command.add_option("--fps", options.fps, between(0.001, 1000.0), "Frames per second of folders of images");
+  command.add_option("--redo", options.redo, one_of({"camera", "colour", "marker", "registration", "check"}),
+                     "A step that is done again though it was done, with those after it");
+  command.add_flag("--no-questions", options.no_questions, "Leave out what no option names; a terminal prompts for it");
   command.footer(
       "RIG.calibration.yaml beside the rig lists each step with its command and time: a second run goes on where\n"
       "the first one stopped. A step is done again when its recording, its command, an earlier step or the rig "
@@ -393,7 +373,6 @@ void add_calibrate_all(Command parent, Run& run_later) {
       "--swing swing.mp4 --joints joints.csv --report check.html\n"
       "  lapservo calibrate all --rig rig.yaml --camera ros2:/endoscope/image_raw --robot ros2:PSM1 --enable-motion "
       "--joint-limits configs/joint_limits/psm-classic.yaml");
-  command.runs(run_later, [options] { return run_all(*options); });
 }
 
 }  // namespace lapservo::app

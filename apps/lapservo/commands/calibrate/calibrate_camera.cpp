@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cstdio>
-#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -10,7 +9,7 @@
 
 #include "apps/lapservo/cli/interrupt.h"
 #include "apps/lapservo/cli/subcommands.h"
-#include "apps/lapservo/commands/calibrate/calibrate_steps.h"
+#include "apps/lapservo/commands/calibrate/calibrate_inputs.h"
 #include "apps/lapservo/inputs/frame_input.h"
 #include "apps/lapservo/inputs/input_files.h"
 #include "lapservo/calibration/camera/camera_measurement.h"
@@ -48,11 +47,6 @@ void look_at(const std::string& input, const CalibrateCameraOptions& options, co
   recordings.look_at(*source, input, watched_job(),
                      [](const std::string& wanted) { std::fprintf(stderr, "lapservo: %s\n", wanted.c_str()); });
   if (!recordings.read().stopped) say_complaint(input, recordings.read().complaint);
-}
-
-int refuse(const CalibrateCameraOptions& options, const std::string& why) {
-  std::fprintf(stderr, "lapservo: %s: %s; nothing was written\n", options.input().c_str(), why.c_str());
-  return 1;
 }
 
 void print_result(const std::vector<BoardView>& views, const CameraCalibration& calibration) {
@@ -113,7 +107,7 @@ int calibrate_camera(const CalibrateCameraOptions& options) {
   const auto without_board = recordings.without_board();
   const CameraMeasurement measured = measure_camera(board, std::move(recordings), before, watched_job());
   const auto& [calibration, views, more] = measured;
-  if (!calibration.refusal.empty()) return refuse(options, calibration.refusal);
+  if (!calibration.refusal.empty()) return refuse(options.input(), calibration.refusal + "; nothing was written");
   for (const std::string& name : without_board) std::printf("left out, there is no board: %s\n", name.c_str());
   print_result(views, calibration);
   if (!more.empty()) std::printf("better still: %s\n", more.c_str());
@@ -124,25 +118,23 @@ int calibrate_camera(const CalibrateCameraOptions& options) {
   return 0;
 }
 
-void add_calibrate_camera(Command parent, Run& run_later) {
-  auto options = std::make_shared<CalibrateCameraOptions>();
-  Command command = parent.add_subcommand(
-      "camera", "Measure a camera with a chessboard: matrix, distortion, lateral chromatic aberration, response.");
-  command
-      .add_option("input", options->inputs,
-                  "Images of the board from different sides: images, folders, a video, a bag, a camera or a stream")
-      .required();
-  add_image_topic_option(command, options->image_topic);
-  add_video_options(command, *options);
-  command.add_flag("--deinterlace", options->deinterlace, "For interlaced video: measure the field of the even rows");
-  add_board_options(command, options->board, true);
-  command.add_option("--rig", options->rig, "The rig that has this camera: its response is where the search starts");
-  command.add_option("--out", options->out,
+void add_calibrate_camera(Command parent) {
+  auto [command, options] = parent.add_subcommand<CalibrateCameraOptions>(
+      "camera", "Measure a camera with a chessboard: matrix, distortion, lateral chromatic aberration, response.",
+      calibrate_camera);
+  command.add_option("input", options.inputs, required(),
+                     "Images of the board from different sides: images, folders, a video, a bag, a camera or a stream");
+  add_image_topic_option(command, options.image_topic);
+  add_video_options(command, options);
+  command.add_flag("--deinterlace", options.deinterlace, "For interlaced video: measure the field of the even rows");
+  add_board_options(command, options.board, true);
+  command.add_option("--rig", options.rig, "The rig that has this camera: its response is where the search starts");
+  command.add_option("--out", options.out,
                      "With --rig: the rig to write, else the rig itself is replaced. Without: the camera's file");
-  command.add_option("--camera-info", options->camera_info,
+  command.add_option("--camera-info", options.camera_info,
                      "The camera alone, as a ROS camera_info, which a rig's camera may name");
-  command.add_option("--views", options->views, "Views to choose from a video or a camera at most")
-      .whole_number_between(4, 200);
+  command.add_option("--views", options.views, whole_between(4, 200),
+                     "Views to choose from a video or a camera at most");
   command.footer(
       "Show the whole board, flat and sharp, in 12 or more images: in every part of the image, near, and tilted by\n"
       "20 to 40 degrees to all sides; fix exposure and focus. A camera is looked at until its views suffice, or "
@@ -150,7 +142,6 @@ void add_calibrate_camera(Command parent, Run& run_later) {
       "All numbers are written with one standard deviation each (sigma_...), the response's where the images determine "
       "it.\n"
       "Example:\n  lapservo calibrate camera boards/ --board 9x6 --square-mm 5 --rig rig.yaml");
-  command.runs(run_later, [options] { return calibrate_camera(*options); });
 }
 
 }  // namespace lapservo::app

@@ -1,13 +1,11 @@
 #include <cstddef>
 #include <cstdio>
-#include <memory>
 
 #include "apps/lapservo/cli/interrupt.h"
 #include "apps/lapservo/cli/subcommands.h"
 #include "apps/lapservo/commands/calibrate/calibrate_inputs.h"
-#include "apps/lapservo/commands/calibrate/calibrate_steps.h"
 #include "apps/lapservo/inputs/frame_input.h"
-#include "lapservo/calibration/colour/colour_measurement.h"
+#include "lapservo/calibration/colour/colour_calibration.h"
 #include "lapservo/core/atomic_file.h"
 
 namespace lapservo::app {
@@ -26,9 +24,9 @@ void print(const Instrument& instrument, const ColourCalibration& calibration, s
 
 }  // namespace
 
-int calibrate_colour(const CalibrateColourOptions& options) {
+int calibrate_colour(const CalibrateOptions& options) {
   const Rig rig = load_rig(options.rig);
-  const std::size_t index = instrument_meant(rig, options);
+  const std::size_t index = instrument_meant(rig, options.instrument, options.rig);
   const Instrument& instrument = rig.instruments[index];
   refuse_outputs_over_inputs(options, rig);
   const auto source = open_frames(options.input, options, &rig.camera);
@@ -44,21 +42,19 @@ int calibrate_colour(const CalibrateColourOptions& options) {
   return write_rig(out, with_colour(rig, index, calibration), options.out);
 }
 
-void add_calibrate_colour(Command parent, Run& run_later) {
-  auto options = std::make_shared<CalibrateColourOptions>();
-  Command command = parent.add_subcommand(
-      "colour", "Measure the hues of a mounted marker's bands as the camera has them, and how it encodes light.");
-  command
-      .add_option("input", options->input, "The marker in motion: images, a folder, a video, or a camera until Ctrl-C")
-      .required();
-  add_calibrate_options(command, *options);
-  command.add_flag("--replace-response", options->replace_response,
+void add_calibrate_colour(Command parent) {
+  auto [command, options] = parent.add_subcommand<CalibrateOptions>(
+      "colour", "Measure the hues of a mounted marker's bands as the camera has them, and how it encodes light.",
+      calibrate_colour);
+  command.add_option("input", options.input, required(),
+                     "The marker in motion: images, a folder, a video, or a camera until Ctrl-C");
+  add_calibrate_options(command, options);
+  command.add_flag("--replace-response", options.replace_response,
                    "Also a response that calibrate camera measured (sigma_response), which stays else");
   command.footer(
       "Move the instrument through the image and turn it, 10 s or more, wholly in view and not overexposed. The rig's\n"
       "hues may be up to 60 degrees off; the response is written where the frames show another than the rig's.\n"
       "Example:\n  lapservo calibrate colour motion.mp4 --rig rig.yaml --out rig.yaml");
-  command.runs(run_later, [options] { return calibrate_colour(*options); });
 }
 
 }  // namespace lapservo::app

@@ -10,20 +10,20 @@
 #include "apps/lapservo/inputs/frame_input.h"
 #include "apps/lapservo/inputs/input_files.h"
 #include "lapservo/core/error.h"
-#include "lapservo/rig/instrument_index.h"
+#include "lapservo/rig/instruments.h"
 #include "lapservo/rig/rig_writer.h"
 
 namespace lapservo::app {
 using namespace internal;
 
-void add_board_options(Command command, BoardOptions& options, bool required) {
-  auto corners =
-      command.add_option("--board", options.corners, "Inner corners of the board, COLUMNSxROWS, for example 9x6");
-  auto squares = command.add_option("--square-mm", options.square_mm, "Width of a square").number_between(0.1, 1000.0);
-  if (required) corners.required(), squares.required();
+void add_board_options(Command command, BoardOptions& options, bool always) {
+  const Rule width = between(0.1, 1000.0);
+  command.add_option("--board", options.corners, always ? required() : Rule(),
+                     "Inner corners of the board, COLUMNSxROWS, for example 9x6");
+  command.add_option("--square-mm", options.square_mm, always ? required(width) : width, "Width of a square");
   command.add_option("--aruco", options.dictionary, "For a ChArUco board: its markers' dictionary, as DICT_4X4_50");
-  command.add_option("--marker-mm", options.marker_mm, "For a ChArUco board: a marker's width; else 3/4 of a square")
-      .number_between(0.05, 1000.0);
+  command.add_option("--marker-mm", options.marker_mm, between(0.05, 1000.0),
+                     "For a ChArUco board: a marker's width; else 3/4 of a square");
 }
 
 Board board_of(const BoardOptions& options) {
@@ -33,9 +33,9 @@ Board board_of(const BoardOptions& options) {
 }
 
 void add_calibrate_options(Command command, CalibrateOptions& options) {
-  command.add_option("--rig", options.rig, "The rig as it is known so far").required();
-  command.add_option("--out", options.out, "The rig to write or replace, with what was measured; may be --rig's")
-      .required();
+  command.add_option("--rig", options.rig, required(), "The rig as it is known so far");
+  command.add_option("--out", options.out, required(),
+                     "The rig to write or replace, with what was measured; may be --rig's");
   add_recording_options(command, options);
 }
 
@@ -44,17 +44,11 @@ void add_recording_options(Command command, CalibrateOptions& options) {
   command.add_flag("--deinterlace", options.deinterlace, "For interlaced video: measure the field of the even rows");
   add_image_topic_option(command, options.image_topic);
   add_video_options(command, options);
-  command.add_option("--fps", options.fps, "Frames per second of a folder of images").number_between(0.001, 1000.0);
+  command.add_option("--fps", options.fps, between(0.001, 1000.0), "Frames per second of a folder of images");
 }
 
-std::size_t named_instrument(const Rig& rig, const std::string& name, const std::string& rig_file) {
-  if (name.empty()) {
-    if (rig.instruments.size() > 1) throw InputError(rig_file, "has several instruments: name one with --instrument");
-    return 0;
-  }
-  const auto index = instrument_index(rig, name);
-  if (!index) throw InputError("--instrument", "name", name, "an instrument of " + rig_file);
-  return *index;
+std::size_t instrument_meant(const Rig& rig, const std::string& name, const std::string& rig_file) {
+  return named_instrument(rig, name.empty() ? std::nullopt : std::optional(name), rig_file, "--instrument");
 }
 
 void refuse_outputs_over_inputs(const CalibrateOptions& options, const Rig& rig) {
@@ -101,9 +95,13 @@ int write_rig(AtomicFile& out, const Rig& rig, const std::string& path) {
   return 0;
 }
 
-int refuse_calibration(const CalibrateOptions& options, const std::string& why) {
-  std::fprintf(stderr, "lapservo: %s: %s; the rig is as it was\n", options.input.c_str(), why.c_str());
+int refuse(const std::string& source, const std::string& why) {
+  std::fprintf(stderr, "lapservo: %s: %s\n", source.c_str(), why.c_str());
   return 1;
+}
+
+int refuse_calibration(const CalibrateOptions& options, const std::string& why) {
+  return refuse(options.input, why + "; the rig is as it was");
 }
 
 }  // namespace lapservo::app

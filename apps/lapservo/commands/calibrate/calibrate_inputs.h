@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
@@ -21,7 +22,8 @@ struct DvrkOptions {
 /// Options of the subcommands that measure one instrument of a rig from frames.
 struct CalibrateOptions : FrameOptions {
   std::string input, rig, out, instrument, joints, report, joint_topic;
-  DvrkOptions dvrk;  ///< of registration only
+  bool replace_response = false;  ///< of colour only
+  DvrkOptions dvrk;               ///< of registration only
 };
 
 /// A board as its options describe it.
@@ -29,7 +31,8 @@ struct BoardOptions {
   std::string corners, dictionary;
   std::optional<double> square_mm, marker_mm;
 };
-void add_board_options(Command command, BoardOptions& options, bool required);
+/// `always`: whether --board and --square-mm are required.
+void add_board_options(Command command, BoardOptions& options, bool always);
 /// `square_mm` is given. Throws InputError for corners that are no board's.
 internal::Board board_of(const BoardOptions& options);
 
@@ -41,10 +44,7 @@ void add_recording_options(Command command, CalibrateOptions& options);
 
 /// Place in the rig of the instrument of that name, or of the only one where none is given. Throws InputError where
 /// that is open or unknown.
-std::size_t named_instrument(const Rig& rig, const std::string& name, const std::string& rig_file);
-inline std::size_t instrument_meant(const Rig& rig, const CalibrateOptions& options) {
-  return named_instrument(rig, options.instrument, options.rig);
-}
+std::size_t instrument_meant(const Rig& rig, const std::string& name, const std::string& rig_file);
 
 /// Throws InputError when a result would go over an input or another result, a page over the rig, or
 /// the rig over its camera's or tools' files.
@@ -62,7 +62,41 @@ internal::JobWatch watched_job();
 /// Writes the rig with what was measured, and says where it is; returns the exit code.
 int write_rig(internal::AtomicFile& out, const Rig& rig, const std::string& path);
 
-/// Says on stderr why nothing was written; returns the exit code.
+/// Says on stderr why there is no result; returns the exit code.
+int refuse(const std::string& source, const std::string& why);
+/// The same where the rig stays as it was.
 int refuse_calibration(const CalibrateOptions& options, const std::string& why);
+
+/// Options of `calibrate camera`.
+struct CalibrateCameraOptions : FrameOptions {
+  std::vector<std::string> inputs;
+  std::string rig, out, camera_info;
+  BoardOptions board;
+  std::size_t views = 30;
+
+  /// Where the rig goes; empty without one.
+  const std::string& rig_out() const { return rig.empty() || !out.empty() ? out : rig; }
+  std::string input() const { return inputs.size() == 1 ? inputs.front() : inputs.front() + " and others"; }
+};
+
+// The jobs of the subcommands of these names. Each returns the exit code, 0 or 1, and throws InputError for bad input.
+int calibrate_camera(const CalibrateCameraOptions& options);
+int calibrate_colour(const CalibrateOptions& options);
+int calibrate_marker(const CalibrateOptions& options);
+int calibrate_registration(const CalibrateOptions& options);
+/// `out` stays empty: the page is the report.
+int check(const CalibrateOptions& options);
+
+/// Options of `lapservo record`.
+struct RecordOptions {
+  std::string camera, robot, rig, out, move, joint_limits, instrument;
+  double duration_s = 20, scale = 1, fps = 30;
+  int setpoint_readers = 1;
+  bool until_enter = false, enable_motion = false;
+};
+
+/// Records until the time is up, the motion done, Ctrl-C or, with that option, a line on standard input. Exit code 1
+/// when no image came or the motion did not end well; the bag keeps what was recorded.
+int record(const RecordOptions& options);
 
 }  // namespace lapservo::app

@@ -1,13 +1,12 @@
 #include <cmath>
 #include <cstdio>
-#include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
 
 #include "apps/lapservo/cli/interrupt.h"
 #include "apps/lapservo/cli/subcommands.h"
-#include "apps/lapservo/commands/calibrate/calibrate_steps.h"
+#include "apps/lapservo/commands/calibrate/calibrate_inputs.h"
 #include "apps/lapservo/inputs/frame_input.h"
 #include "apps/lapservo/inputs/joint_input.h"
 #include "lapservo/calibration/marker/marker_measurement.h"
@@ -52,7 +51,7 @@ void print_scale(const Marker& before, const Marker& after) {
 
 int calibrate_marker(const CalibrateOptions& options) {
   Rig rig = load_rig(options.rig);
-  const std::size_t index = instrument_meant(rig, options);
+  const std::size_t index = instrument_meant(rig, options.instrument, options.rig);
   const Instrument& instrument = rig.instruments[index];
   refuse_outputs_over_inputs(options, rig);
   const auto source = open_frames(options.input, options, &rig.camera);
@@ -85,16 +84,15 @@ int calibrate_marker(const CalibrateOptions& options) {
   return write_rig(out, rig, options.out);
 }
 
-void add_calibrate_marker(Command parent, Run& run_later) {
-  auto options = std::make_shared<CalibrateOptions>();
-  Command command = parent.add_subcommand(
-      "marker", "Measure a mounted marker's print: band lengths, a wrap that is not square, the gap at the seam.");
-  command
-      .add_option("input", options->input,
-                  "Images of a slow full turn about the shaft's axis: a folder, a video, a bag, a camera or a stream")
-      .required();
-  add_calibrate_options(command, *options);
-  add_joint_options(command, *options,
+void add_calibrate_marker(Command parent) {
+  auto [command, options] = parent.add_subcommand<CalibrateOptions>(
+      "marker", "Measure a mounted marker's print: band lengths, a wrap that is not square, the gap at the seam.",
+      calibrate_marker);
+  command.add_option(
+      "input", options.input, required(),
+      "Images of a slow full turn about the shaft's axis: a folder, a video, a bag, a camera or a stream");
+  add_calibrate_options(command, options);
+  add_joint_options(command, options,
                     "CSV of the arm's joints meanwhile (time_s and a column a joint, named as in the rig's joints), or "
                     "a bag, the input itself for example: for seam_rad too, which images alone can't determine");
   command.footer(
@@ -103,7 +101,6 @@ void add_calibrate_marker(Command parent, Run& run_later) {
       "it may move otherwise too. For a compressed video turn it there and back. All numbers are written with one "
       "standard deviation each (sigma_...).\n"
       "Example:\n  lapservo calibrate marker turn.mp4 --rig designed.yaml --out rig.yaml");
-  command.runs(run_later, [options] { return calibrate_marker(*options); });
 }
 
 }  // namespace lapservo::app

@@ -2,7 +2,6 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
-#include <memory>
 #include <optional>
 #include <string>
 #include <thread>
@@ -11,7 +10,7 @@
 
 #include "apps/lapservo/cli/interrupt.h"
 #include "apps/lapservo/cli/subcommands.h"
-#include "apps/lapservo/commands/calibrate/calibrate_steps.h"
+#include "apps/lapservo/commands/calibrate/calibrate_inputs.h"
 #include "apps/lapservo/inputs/frame_input.h"
 #include "apps/lapservo/inputs/joint_input.h"
 #include "apps/lapservo/inputs/live_images.h"
@@ -161,7 +160,7 @@ void print_reach(const Marker& marker, const Registration& registration) {
 
 int calibrate_registration(const CalibrateOptions& options) {
   Rig rig = load_rig(options.rig);
-  const std::size_t index = instrument_meant(rig, options);
+  const std::size_t index = instrument_meant(rig, options.instrument, options.rig);
   Instrument instrument = rig.instruments[index];
   refuse_outputs_over_inputs(options, rig);
   const auto frames = is_table(options.input) ? nullptr : open_frames(options.input, options, &rig.camera);
@@ -191,22 +190,25 @@ int calibrate_registration(const CalibrateOptions& options) {
   return 0;
 }
 
-void add_calibrate_registration(Command parent, Run& run_later) {
-  auto options = std::make_shared<CalibrateOptions>();
-  Command command = parent.add_subcommand(
+void add_calibrate_registration(Command parent) {
+  const auto job = [](const CalibrateOptions& options, const Command& command) {
+    if (is_table(options.input))
+      command.refuse(frame_option_names(), "is of frames, and a CSV of observations has none");
+    return calibrate_registration(options);
+  };
+  auto [command, options] = parent.add_subcommand<CalibrateOptions>(
       "registration",
-      "Measure where the arm stands before the camera, its joints' signs and offsets, and the video's delay.");
-  command
-      .add_option("input", options->input,
-                  "The marker in motion: a folder, a video, a bag (which brings its joints along), a camera, a stream, "
-                  "or a CSV of observations that were tracked without camera_from_rcm")
-      .required();
-  add_calibrate_options(command, *options);
+      "Measure where the arm stands before the camera, its joints' signs and offsets, and the video's delay.", job);
+  command.add_option(
+      "input", options.input, required(),
+      "The marker in motion: a folder, a video, a bag (which brings its joints along), a camera, a stream, "
+      "or a CSV of observations that were tracked without camera_from_rcm");
+  add_calibrate_options(command, options);
   add_joint_options(
-      command, *options,
+      command, options,
       "CSV of the arm's joints meanwhile (time_s and a column a joint, named as in the rig's joints), or a bag; "
       "without it those in the input, where it is a bag. Without any only the RCM's position can be determined");
-  add_dvrk_options(command, options->dvrk);
+  add_dvrk_options(command, options.dvrk);
   command.footer(
       "Swing the instrument by 0.5 rad in both directions, insert and withdraw it by 20 mm, turn it by 2 rad, all of "
       "it\n"
@@ -214,11 +216,6 @@ void add_calibrate_registration(Command parent, Run& run_later) {
       "offset\n"
       "stays the rig's: camera_from_rcm turns with it.\n"
       "Example:\n  lapservo calibrate registration motion.mp4 --joints joints.csv --rig rig.yaml --out rig.yaml");
-  command.runs(run_later, [options, command] {
-    if (is_table(options->input))
-      command.refuse(frame_option_names(), "is of frames, and a CSV of observations has none");
-    return calibrate_registration(*options);
-  });
 }
 
 }  // namespace lapservo::app

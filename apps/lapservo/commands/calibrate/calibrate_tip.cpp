@@ -1,6 +1,5 @@
 #include <cmath>
 #include <cstdio>
-#include <memory>
 #include <string>
 #include <vector>
 
@@ -8,12 +7,11 @@
 
 #include "apps/lapservo/cli/interrupt.h"
 #include "apps/lapservo/cli/subcommands.h"
-#include "apps/lapservo/commands/calibrate/calibrate_steps.h"
+#include "apps/lapservo/commands/calibrate/calibrate_inputs.h"
 #include "apps/lapservo/inputs/frame_input.h"
 #include "lapservo/calibration/camera/camera_measurement.h"
 #include "lapservo/calibration/registration/registration_measurement.h"
-#include "lapservo/calibration/tip/tip_ways.h"
-#include "lapservo/calibration/tip/tool_place.h"
+#include "lapservo/calibration/tip/tip_fit.h"
 #include "lapservo/calibration/tip/touch_measurement.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/core/atomic_file.h"
@@ -100,7 +98,7 @@ int calibrate_tip(CalibrateTipOptions options, const Command& command) {
     command.refuse(frame_option_names(), "is of images, expected --pivot or --touch with it");
   options.input = options.pivot + options.touches;  // the one that is given
   Rig rig = load_rig(options.rig);
-  const std::size_t index = instrument_meant(rig, options);
+  const std::size_t index = instrument_meant(rig, options.instrument, options.rig);
   refuse_outputs_over_inputs(options, rig);
   AtomicFile out(options.out);
   watch_for_interrupts();
@@ -117,30 +115,29 @@ int calibrate_tip(CalibrateTipOptions options, const Command& command) {
 
 }  // namespace
 
-void add_calibrate_tip(Command parent, Run& run_later) {
-  auto options = std::make_shared<CalibrateTipOptions>();
-  Command command = parent.add_subcommand(
-      "tip", "Measure where the instrument ends: the tip in the marker's frame, and a wrist's place behind it.");
+void add_calibrate_tip(Command parent) {
+  auto [command, options] = parent.add_subcommand<CalibrateTipOptions>(
+      "tip", "Measure where the instrument ends: the tip in the marker's frame, and a wrist's place behind it.",
+      calibrate_tip);
   command.add_option(
-      "--pivot", options->pivot,
+      "--pivot", options.pivot,
       "The tip rests in a dimple, its wrist straight, while the shaft is tilted to all sides and rolled: "
       "a folder, a video, a bag, a camera or a stream of 20 s");
-  command.add_option("--touch", options->touches,
+  command.add_option("--touch", options.touches,
                      "CSV of images of touches: file, column and row of the inner corner of a board that the tip is "
                      "on, and a column in rad for each joint of the wrist; an image without column and row shows the "
                      "board alone");
-  command.add_option("--calliper", options->calliper,
+  command.add_option("--calliper", options.calliper,
                      "MM[:SIGMA]: distance of the marker's distal edge from the wrist's axis, or from a straight "
                      "tool's tip, by callipers; sigma is 0.1 mm if not given");
-  add_board_options(command, options->board, false);
-  add_calibrate_options(command, *options);
+  add_board_options(command, options.board, false);
+  add_calibrate_options(command, options);
   command.footer(
       "The rig's camera and marker must be calibrated; a rig without a tool gets a straight one. With --pivot, tilt "
       "by\n"
       "20 degrees or more to all sides; with --touch, touch 5 corners or more (10 with the wrist bent differently),\n"
       "the shaft tilted and rolled differently.\n"
       "Example:\n  lapservo calibrate tip --pivot pivot.mp4 --rig rig.yaml --out rig.yaml");
-  command.runs(run_later, [options, command] { return calibrate_tip(*options, command); });
 }
 
 }  // namespace lapservo::app

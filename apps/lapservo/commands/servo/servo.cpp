@@ -21,7 +21,7 @@
 #include "lapservo/control/random_start.h"
 #include "lapservo/core/error.h"
 #include "lapservo/core/random.h"
-#include "lapservo/rig/single_instrument.h"
+#include "lapservo/rig/instruments.h"
 #include "lapservo/robot/supervisor.h"
 #include "lapservo/servo/controller_file.h"
 #include "lapservo/servo/goal_check.h"
@@ -58,10 +58,10 @@ JointVector joints_at_start(const ServoOptions& options, const Trajectory& traje
     amid_limits.q = JointVector::from_vector((limits.lower + limits.upper) / 2);
     if (const auto& tool = run.rig.instruments.front().tool) amid_limits.wrist_rad = simulated_wrist_rad(*tool, 0);
     tips.follow(amid_limits);
-    refuse_goal(trajectory, duration_s(options), run.rig, run.rig.instruments.front().camera_from_rcm, run.controller,
+    refuse_goal(trajectory, options.duration_s(), run.rig, run.rig.instruments.front().camera_from_rcm, run.controller,
                 amid_limits, run.trajectory_name);
   }
-  return random_start(tips.features_of(trajectory), duration_s(options), true_model, run.controller, joint_offset,
+  return random_start(tips.features_of(trajectory), options.duration_s(), true_model, run.controller, joint_offset,
                       random, run.trajectory_name);
 }
 
@@ -100,7 +100,7 @@ int simulate(const ServoOptions& options) {
   SimulatorConfig simulated;
   simulated.seed = options.seed;
   simulated.endoscope.latency_s = options.latency_ms / 1000;
-  simulated.endoscope.frame_rate_hz = periods_per_s(options);
+  simulated.endoscope.frame_rate_hz = options.periods_per_s();
   const JointVector start = joints_at_start(options, trajectory, config, true_model, simulated.arm.joint_offset);
   Simulator simulator(true_rig, simulated, start);
   if (!options.hide.empty()) simulator.cover_marker({options.hide[0], options.hide[1]});
@@ -108,13 +108,13 @@ int simulate(const ServoOptions& options) {
   if (options.web.port) page.emplace(options, config.rig, "servo, simulated", true);
   Supervisor arm(simulator, simulator);
   if (options.page_says_operator_present()) arm.watch_operator([&] { return page->operator_present(); });
-  auto folder = run_folder(options, duration_s(options), believed_rig, config.controller, &true_rig);
+  auto folder = run_folder(options, options.duration_s(), believed_rig, config.controller, &true_rig);
   watch_for_interrupts();
 
   ChangingGoal goal(trajectory, config);
   SimulationWatcher watcher(options, std::move(folder), arm, page ? &*page : nullptr, true_model, simulator, goal,
-                            static_cast<int>(std::lround(duration_s(options) / config.controller.period_s)));
-  lapservo::run(arm, simulator, simulator, config, goal.trajectory(), duration_s(options), watcher);
+                            static_cast<int>(std::lround(options.duration_s() / config.controller.period_s)));
+  lapservo::run(arm, simulator, simulator, config, goal.trajectory(), options.duration_s(), watcher);
   watcher.end_progress();
   std::printf("method %s, seen by %s\n%s\n", std::string(to_string(config.controller.mode)).c_str(),
               config.tracker.method == Method::centerline ? "the paper's Algorithm 1" : "all visible lines",
@@ -205,11 +205,9 @@ void add_arm_options(Command command, ServoOptions& options) {
   command.add_option("--endoscope", options.endoscope,
                      "The arm that holds the endoscope and may move slowly meanwhile: ros2:ECM, ros1:ECM. The rig's "
                      "camera_from_rcm is that of the start");
-  command
-      .add_option("--control", options.control,
-                  "Who may say stop and start, and set goals: the page of --web, the topics, which anybody in the "
-                  "network may publish, both, or nobody but Ctrl-C")
-      .one_of({"none", "page", "topics", "both"});
+  command.add_option("--control", options.control, one_of({"none", "page", "topics", "both"}),
+                     "Who may say stop and start, and set goals: the page of --web, the topics, which anybody in the "
+                     "network may publish, both, or nobody but Ctrl-C");
   command.add_option("--operator-present", options.operator_present,
                      "Move the arm only while a button is pressed, and said to be every 0.2 s: of this topic, a "
                      "std_msgs/Bool or the first of a sensor_msgs/Joy; `page`: that of --web's page");
@@ -227,36 +225,29 @@ void add_trajectory_options(Command command, ServoOptions& options) {
       "--trajectory", options.trajectory,
       "paper: section V-D's sinusoids, omega 0.5 read in rad/s; or a CSV of time_s,s_rad,r_px,l_px,d_px, or of the "
       "tip: time_s,x_m,y_m,z_m with roll_rad or without. Its time stands while the arm is held until a start");
-  command.add_option("--set-point", options.set_point, "Instead: s_rad,r_px,l_px,d_px to reach and keep")
-      .finite_numbers(4);
-  command
-      .add_option(
-          "--tip", options.tip,
-          "Instead: x,y,z or x,y,z,roll of the tip in the camera's frame, metres and rad, to reach and keep, by "
-          "the rig's camera_from_rcm and tool. The image closes it across the line of sight; in depth the rig "
-          "counts. roll is psi; without it the roll stays")
-      .finite_numbers();
-  command
-      .add_option("--via", options.via,
-                  "Instead: points s_rad,r_px,l_px,d_px,s_rad,... to pass, a second at rest in each")
-      .finite_numbers();
-  command.add_option("--duration", options.duration, "Seconds, else 20, or all of a recording")
-      .number_between(0.1, 36000.0);
+  command.add_option("--set-point", options.set_point, finite_numbers(4),
+                     "Instead: s_rad,r_px,l_px,d_px to reach and keep");
+  command.add_option(
+      "--tip", options.tip, finite_numbers(),
+      "Instead: x,y,z or x,y,z,roll of the tip in the camera's frame, metres and rad, to reach and keep, by "
+      "the rig's camera_from_rcm and tool. The image closes it across the line of sight; in depth the rig "
+      "counts. roll is psi; without it the roll stays");
+  command.add_option("--via", options.via, finite_numbers(),
+                     "Instead: points s_rad,r_px,l_px,d_px,s_rad,... to pass, a second at rest in each");
+  command.add_option("--duration", options.duration, between(0.1, 36000.0), "Seconds, else 20, or all of a recording");
 }
 
 void add_control_options(Command command, ServoOptions& options) {
   command.add_option("--method", options.method,
                      "default: measured joints and images fused; paper: its law (eq. 21), gains and Algorithm 1; "
                      "uncalibrated: learns the Jacobian");
-  command
-      .add_option("--tracker", options.tracker,
-                  "surface: all visible lines; centerline: the paper's Algorithm 1. Without it centerline with "
-                  "--method paper, else surface")
-      .one_of({"surface", "centerline"});
+  command.add_option("--tracker", options.tracker, one_of({"surface", "centerline"}),
+                     "surface: all visible lines; centerline: the paper's Algorithm 1. Without it centerline with "
+                     "--method paper, else surface");
   command.add_option("--controller", options.controller,
                      "YAML: gains_per_s, limits, window, delay_s ..., see docs/controller.md");
   command.add_option("--delay-ms", options.delay, "The images' age, or `estimate`");
-  command.add_option("--rcm-px", options.rcm_px, "Image of the RCM u,v, for --method uncalibrated").finite_numbers(2);
+  command.add_option("--rcm-px", options.rcm_px, finite_numbers(2), "Image of the RCM u,v, for --method uncalibrated");
 }
 
 void add_result_options(Command command, ServoOptions& options) {
@@ -279,32 +270,28 @@ void add_replay_options(Command command, ServoOptions& options) {
 }
 
 void add_simulator_options(Command command, ServoOptions& options) {
-  command.add_option("--start", options.start, "sim: measured joints to start from, theta,phi,rho,psi; else random")
-      .finite_numbers(4);
-  command.add_option("--seed", options.seed, "sim: of start, tissue, noise, jitter").seed_number();
-  command.add_option("--latency-ms", options.latency_ms, "sim: from exposure to arrival").number_between(0.0, 1000.0);
-  command
-      .add_option("--fps", options.fps,
-                  "Control periods, and frames in sim, a second; else 60 in sim and 120 with an arm")
-      .number_between(6.0, 500.0);
-  command
-      .add_option("--registration-error", options.registration_error,
-                  "sim: x,y,z: the true RCM lies by so many mm, in the camera's frame, beside the rig's")
-      .finite_numbers(3);
-  command.add_option("--hide", options.hide, "sim: cover the marker from,to seconds").finite_numbers(2);
+  command.add_option("--start", options.start, finite_numbers(4),
+                     "sim: measured joints to start from, theta,phi,rho,psi; else random");
+  command.add_option("--seed", options.seed, seed_number(), "sim: of start, tissue, noise, jitter");
+  command.add_option("--latency-ms", options.latency_ms, between(0.0, 1000.0), "sim: from exposure to arrival");
+  command.add_option("--fps", options.fps, between(6.0, 500.0),
+                     "Control periods, and frames in sim, a second; else 60 in sim and 120 with an arm");
+  command.add_option("--registration-error", options.registration_error, finite_numbers(3),
+                     "sim: x,y,z: the true RCM lies by so many mm, in the camera's frame, beside the rig's");
+  command.add_option("--hide", options.hide, finite_numbers(2), "sim: cover the marker from,to seconds");
 }
 
 }  // namespace
 
-void add_servo(Command app, Run& run_later) {
-  auto options = std::make_shared<ServoOptions>();
-  Command command = app.add_subcommand("servo", "Steer the instrument along a trajectory of image features.");
-  add_arm_options(command, *options);
-  add_trajectory_options(command, *options);
-  add_control_options(command, *options);
-  add_result_options(command, *options);
-  add_replay_options(command, *options);
-  add_simulator_options(command, *options);
+void add_servo(Command app) {
+  auto [command, options] =
+      app.add_subcommand<ServoOptions>("servo", "Steer the instrument along a trajectory of image features.", run);
+  add_arm_options(command, options);
+  add_trajectory_options(command, options);
+  add_control_options(command, options);
+  add_result_options(command, options);
+  add_replay_options(command, options);
+  add_simulator_options(command, options);
   command.footer(
       "The paper's gains K = 0.032, 0.008, 0.0008, 0.01 (s, r, l, d) and omega = 0.5 have no unit of time in it. Here "
       "K\n"
@@ -316,7 +303,6 @@ void add_servo(Command app, Run& run_later) {
       "  lapservo servo --rig configs/paper.yaml --robot ros2:PSM1 --camera /dev/video0 --web\n"
       "  lapservo servo --replay run/log.csv\n"
       "  lapservo servo --replay swing.bag --rig rig.yaml --out decided");
-  command.runs(run_later, [options, command] { return run(*options, command); });
 }
 
 }  // namespace lapservo::app

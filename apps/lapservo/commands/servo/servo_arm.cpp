@@ -191,7 +191,7 @@ int steer_arm(const ServoOptions& options) {
     arm.watch_operator([&] { return operator_presence->was_present(); });
   }
   // Before the arm is heard, so that another loop of this name is.
-  LoopTopics topics(transport, rig, frames, !options.endoscope.empty(), may_command(options, "topics"));
+  LoopTopics topics(transport, rig, frames, !options.endoscope.empty(), options.may_command("topics"));
   std::optional<ArmPose> endoscope_arm;
   std::optional<HeldEndoscope> endoscope;
   if (!options.endoscope.empty()) {
@@ -216,14 +216,14 @@ int steer_arm(const ServoOptions& options) {
   }
   if (const std::string not_granted = robot.not_granted(); options.enable_motion && !not_granted.empty())
     std::printf("setpoints leave without %s, see docs/ros.md\n", not_granted.c_str());
-  auto folder = run_folder(options, duration_s(options), rig, controller_of(config));
+  auto folder = run_folder(options, options.duration_s(), rig, controller_of(config));
 
   ChangingGoal goal(trajectory, config);
   ArmWatcher watcher(options, std::move(folder), arm, its_page, config, robot,
                      endoscope_arm ? &*endoscope_arm : nullptr, images, topics, goal);
   if (ended_by_page()) return end_by_page();
   request_real_time(loop_priority);  // the robot has said what is not granted
-  lapservo::run(arm, images, clock, config, goal.trajectory(), duration_s(options), watcher);
+  lapservo::run(arm, images, clock, config, goal.trajectory(), options.duration_s(), watcher);
   say_counts(robot.counts(), images.counts());
   std::printf("%s\n", watcher.summary().text().c_str());
   return watcher.commit_log() && watcher.summary().succeeded(options.strict) ? 0 : 1;

@@ -17,7 +17,7 @@
 #include "lapservo/crtk/joint_map.h"
 #include "lapservo/experiments/setup.h"
 #include "lapservo/kinematics/centre_line.h"
-#include "lapservo/rig/single_instrument.h"
+#include "lapservo/rig/instruments.h"
 #include "lapservo/servo/controller_file.h"
 #include "lapservo/servo/image_window.h"
 
@@ -32,9 +32,9 @@ ControllerConfig controller_of(const ServoOptions& options, const Rig& rig) {
   ControllerConfig config;
   const auto mode = control_mode_from_string(options.method);
   if (!mode) throw InputError("--method", "is " + options.method + ", expected default, paper or uncalibrated");
-  if (*mode == ControlMode::paper) config = paper_controller(1 / periods_per_s(options));
+  if (*mode == ControlMode::paper) config = paper_controller(1 / options.periods_per_s());
   config.mode = *mode;
-  config.period_s = 1 / periods_per_s(options);
+  config.period_s = 1 / options.periods_per_s();
   config.window = image_window(rig.camera, window_margin_px);
   if (options.delay != "estimate") {
     const auto delay_ms = parse_finite(options.delay);
@@ -109,18 +109,6 @@ std::string goal_option(const ServoOptions& options) {
 }
 
 }  // namespace
-
-bool may_command(const ServoOptions& options, std::string_view who) {
-  return options.control == who || options.control == "both";
-}
-
-double periods_per_s(const ServoOptions& options) {
-  return options.fps.value_or(options.robot == "sim" ? 60 : 120);
-}
-
-double duration_s(const ServoOptions& options) {
-  return options.duration.value_or(20);
-}
 
 const Instrument& arm_of(const ServoOptions& options, const Rig& rig) {
   const Instrument& instrument = rig.instruments.front();

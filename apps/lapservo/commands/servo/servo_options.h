@@ -32,6 +32,11 @@ struct ServoOptions {
 
   /// Else a topic does, or nobody has to.
   bool page_says_operator_present() const { return operator_present == "page"; }
+  /// Whether "page" or "topics" may say stop and start, and set goals.
+  bool may_command(std::string_view who) const { return control == who || control == "both"; }
+  /// The option, else 60 in the simulation and 120 with an arm, where an image waits for the next period.
+  double periods_per_s() const { return fps.value_or(robot == "sim" ? 60 : 120); }
+  double duration_s() const { return duration.value_or(20); }
 };
 
 /// Before it is made to forget anything.
@@ -40,14 +45,6 @@ RunConfig run_config_of(const ServoOptions& options);
 void forget_registration(RunConfig& run, const ServoOptions& options);
 /// The rig's first instrument. Throws InputError when it has no `joints`.
 const Instrument& arm_of(const ServoOptions& options, const Rig& rig);
-
-/// Whether "page" or "topics" may say stop and start, and set goals.
-bool may_command(const ServoOptions& options, std::string_view who);
-
-/// The option, else 60 in the simulation and 120 with an arm, where an image waits for the next period.
-double periods_per_s(const ServoOptions& options);
-/// The option, else 20.
-double duration_s(const ServoOptions& options);
 
 Trajectory trajectory_of(const ServoOptions& options);
 

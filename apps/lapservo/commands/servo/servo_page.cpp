@@ -16,7 +16,7 @@ PageConfig config_of(const ServoOptions& options, const Rig& rig, const std::str
   const Instrument& instrument = rig.instruments.front();
   PageConfig config;
   config.title = title;
-  config.has_loop = may_command(options, "page");
+  config.has_loop = options.may_command("page");
   config.may_start = may_start;
   config.has_run_button = options.page_says_operator_present();
   config.takes_tip_goals = config.has_loop && instrument.camera_from_rcm && instrument.tool && instrument.tool->place;
@@ -40,7 +40,7 @@ PageLoop loop_of(const ControlTick& tick, double time_s) {
 }  // namespace
 
 ServoPage::ServoPage(const ServoOptions& options, const Rig& rig, const std::string& title, bool may_start)
-    : web_(options.web, config_of(options, rig, title, may_start)), rig_(std::make_shared<const Rig>(rig)) {}
+    : web_(open_page(options.web, config_of(options, rig, title, may_start))), rig_(std::make_shared<const Rig>(rig)) {}
 
 void ServoPage::tell(const ControlTick& tick, double time_s, const std::string& state, bool can_start) {
   if (tick.decision.registration != registration_) {
@@ -55,12 +55,12 @@ void ServoPage::tell(const ControlTick& tick, double time_s, const std::string& 
                        tick.seen->first_from_camera});
     if (shown_.size() > most_shown) shown_.pop_back();
     newest_ =
-        web_.show({tick.seen->image.bgr, rig_, tick.seen->observations, tick.input.time_s - tick.seen->image.time_s});
+        web_->show({tick.seen->image.bgr, rig_, tick.seen->observations, tick.input.time_s - tick.seen->image.time_s});
   }
   PageLoop loop = loop_of(tick, time_s);
   loop.can_start = can_start;
   loop.answer = answer_;
-  web_.tell(loop, state);
+  web_->tell(loop, state);
 }
 
 std::optional<TipGoal> ServoPage::tip_goal() {
@@ -83,7 +83,7 @@ void ServoPage::answer(double time_s, const std::string& words) {
 }
 
 bool ServoPage::command(Supervisor& arm, double now_s) {
-  const PageWishes wishes = web_.wishes();
+  const PageWishes wishes = web_->take_wishes();
   if (wishes.tip) tip_ = wishes.tip;
   if (wishes.hold) *wishes.hold ? arm.stop(Commander::page) : arm.start(Commander::page, now_s - wishes.start_age_s);
   return wishes.stop;

@@ -28,10 +28,10 @@ class ServoPage {
   /// Passes the page's commands on; true when one ends the run.
   bool command(Supervisor& arm, double now_s);
   /// The page's run button.
-  bool operator_present() { return web_.operator_present(); }
+  bool operator_present() { return web_->operator_present(); }
 
  private:
-  WebView web_;
+  std::unique_ptr<WebView> web_;
   std::shared_ptr<const Rig> rig_;  ///< with the camera_from_rcm that the loop goes by
   int registration_ = 0;
   /// The tip in an image.

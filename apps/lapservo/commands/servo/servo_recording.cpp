@@ -74,7 +74,7 @@ int decide_on_recording(const ServoOptions& options) {
   watch_for_interrupts();
 
   RecordingWatcher watcher(options, std::move(folder), recorded);
-  lapservo::run(recorded.arm(), recorded.images(), recorded.clock(), config, trajectory, asked_s, watcher);
+  lapservo::run(recorded, recorded, recorded, config, trajectory, asked_s, watcher);
   std::printf("decided on %.1f s of a recording, %d images and the joints; nothing was sent%s\n", watcher.duration_s(),
               recorded.images_given(), watcher.summary().holds_text().c_str());
   say_remark(options.replay, recorded.complaint());
