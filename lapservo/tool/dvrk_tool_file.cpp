@@ -65,7 +65,6 @@ WristJoint parse_joint(const YamlField& field) {
 
 Rigid3 parse_tip(const YamlField& field) {
   constexpr auto expected = "four rows of four numbers, a rotation and a translation in metres";
-  if (!field.present()) return {};
   const auto rows = field.list(expected);
   if (rows.size() != 4) field.fail(field.value_text(), expected);
   Eigen::Matrix4d matrix;
@@ -77,6 +76,14 @@ Rigid3 parse_tip(const YamlField& field) {
       rotation.determinant() < 0)
     field.fail("no rotation and translation", expected);
   return {Eigen::Quaterniond(rotation).normalized(), matrix.topRightCorner<3, 1>()};
+}
+
+// Every file of dVRK's has one of the two: before 2.4 the one with a hyphen.
+YamlField tip_field(const YamlField& root) {
+  YamlField since_2_4 = root["tooltip_offset"], before = root["tooltip-offset"];
+  if (!before.present()) return since_2_4;
+  if (since_2_4.present()) before.fail("beside tooltip_offset", "one of the two: delete the other");
+  return before;
 }
 
 // Those after the joint about the shaft's own axis, from whose frame a tool's place counts.
@@ -104,7 +111,7 @@ Tool parse_dvrk_tool(std::string_view json, const std::string& source) {
   expect_word(dh, "convention", "modified");
   Tool tool;
   tool.wrist = parse_wrist(dh["joints"]);
-  tool.last_from_tip = parse_tip(root["tooltip_offset"]);
+  tool.last_from_tip = parse_tip(tip_field(root));
   if (const YamlField snake = root["snake-like"]; snake.present()) tool.snake_like = snake.boolean();
   return tool;
 }

@@ -9,8 +9,9 @@
 namespace lapservo::internal {
 
 /// The wrist of a dVRK tool file (share/tool/*.json of sawIntuitiveResearchKit), without a place: its joints after
-/// `roll` and its tooltip_offset. Its coupling is that of motors to joints, which measured_js has behind it. Throws
-/// InputError naming file, field, value and what was expected.
+/// `roll` and its tooltip_offset (tooltip-offset before dVRK 2.4), without which it is refused. Its coupling is that of
+/// motors to joints, which measured_js has behind it. Throws InputError naming file, field, value and what was
+/// expected.
 Tool read_dvrk_tool(const std::filesystem::path& path);
 
 /// The same from text; `source` stands for the file's name in errors.

@@ -80,6 +80,12 @@ std::string changed(const std::string& old_text, const std::string& new_text) {
   return json.replace(at, old_text.size(), new_text);
 }
 
+TEST(DvrkToolFile, HasTheTipAlsoByTheKeyOfEarlierReleases) {
+  const Tool since_2_4 = parse_dvrk_tool(invented_tool_json, "tool.json");
+  EXPECT_GT(since_2_4.last_from_tip.translation.norm(), 0);
+  EXPECT_EQ(parse_dvrk_tool(changed("tooltip_offset", "tooltip-offset"), "tool.json"), since_2_4);
+}
+
 TEST(DvrkToolFile, RefusesOthersAndNamesTheField) {
   const auto error_of = [](const std::string& json) {
     return input_error([&] { parse_dvrk_tool(json, "tool.json"); });
@@ -90,6 +96,9 @@ TEST(DvrkToolFile, RefusesOthersAndNamesTheField) {
   EXPECT_NE(error_of(changed("wrist_yaw", "wrist_pitch")).find("joints[2].name"), std::string::npos);
   EXPECT_NE(error_of(changed("\"alpha\":  0.0000", "\"alpha\": 0.1")).find("not about the shaft"), std::string::npos);
   EXPECT_NE(error_of(changed("[-1.0,", "[-2.0,")).find("tooltip_offset"), std::string::npos);
+  EXPECT_NE(error_of(changed("tooltip_offset", "offset")).find("tooltip_offset: is missing"), std::string::npos);
+  EXPECT_NE(error_of(changed("\"jaw\"", "\"tooltip-offset\"")).find("tooltip-offset: is beside tooltip_offset"),
+            std::string::npos);
   EXPECT_NE(error_of(changed("\"DH\"", "\"links\"")).find("DH: is missing"), std::string::npos);
   EXPECT_NE(error_of("[1, 2]"), "");
   EXPECT_NE(error_of("/* {}"), "");
@@ -119,7 +128,8 @@ Chain chain_in(const fs::path& path) {
                           number_after(joint, "offset")});
   }
   chain.rows.erase(chain.rows.begin());  // roll
-  const auto rows = root["tooltip_offset"].list("rows");
+  const bool is_new = root["tooltip_offset"].present();
+  const auto rows = root[is_new ? "tooltip_offset" : "tooltip-offset"].list("rows");
   for (int i = 0; i < 4; ++i) chain.tip.row(i) = Eigen::RowVector4d(rows[i].numbers<4>("numbers").data());
   return chain;
 }
