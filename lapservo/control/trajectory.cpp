@@ -60,28 +60,36 @@ DesiredFeatures minimum_jerk(const Segment& segment, double time_s) {
 
 struct Spline {
   std::vector<double> times_s;
-  std::vector<Eigen::Vector4d> values, curvatures;  ///< second derivatives at the knots
+  std::vector<Eigen::Vector4d> values, curvatures;  ///< second derivatives at the knots, on the side that moves
+  std::vector<bool> rests;                          ///< from this knot to the next
 };
 
-/// Natural end conditions; the tridiagonal system by Thomas' algorithm.
-Spline natural_spline(std::vector<double> times_s, std::vector<Eigen::Vector4d> values) {
+/// Natural end conditions; the tridiagonal system by Thomas' algorithm. A rest passes no slope and no curvature on, as
+/// if it took no time: what moves before and after it is clamped to it.
+Spline natural_spline(std::vector<double> times_s, std::vector<Eigen::Vector4d> values, std::vector<bool> rests) {
   const std::size_t n = times_s.size();
   std::vector<Eigen::Vector4d> curvatures(n, Eigen::Vector4d::Zero());
   std::vector<double> ratio(n, 0.0);
+  const auto moves_s = [&](std::size_t i) { return rests[i] ? 0 : times_s[i + 1] - times_s[i]; };
+  const auto slope = [&](std::size_t i) -> Eigen::Vector4d {
+    return rests[i] ? Eigen::Vector4d::Zero() : Eigen::Vector4d((values[i + 1] - values[i]) / moves_s(i));
+  };
   for (std::size_t i = 1; i + 1 < n; ++i) {
-    const double before_s = times_s[i] - times_s[i - 1], after_s = times_s[i + 1] - times_s[i];
-    const Eigen::Vector4d bend = 6 * ((values[i + 1] - values[i]) / after_s - (values[i] - values[i - 1]) / before_s);
+    const double before_s = moves_s(i - 1), after_s = moves_s(i);
+    if (rests[i - 1] && rests[i]) continue;
+    const Eigen::Vector4d bend = 6 * (slope(i) - slope(i - 1));
     const double pivot = 2 * (before_s + after_s) - before_s * ratio[i - 1];
     ratio[i] = after_s / pivot;
     curvatures[i] = (bend - before_s * curvatures[i - 1]) / pivot;
   }
   for (std::size_t i = n - 1; i-- > 1;) curvatures[i] -= ratio[i] * curvatures[i + 1];
-  return {std::move(times_s), std::move(values), std::move(curvatures)};
+  return {std::move(times_s), std::move(values), std::move(curvatures), std::move(rests)};
 }
 
 DesiredFeatures spline_at(const Spline& spline, double time_s) {
   const auto above = std::upper_bound(spline.times_s.begin() + 1, spline.times_s.end() - 1, time_s);
   const auto i = static_cast<std::size_t>(above - spline.times_s.begin()) - 1;
+  if (spline.rests[i]) return {spline.values[i]};
   const double h = spline.times_s[i + 1] - spline.times_s[i];
   const double b = (time_s - spline.times_s[i]) / h, a = 1 - b;
   const Eigen::Vector4d &y0 = spline.values[i], &y1 = spline.values[i + 1];
@@ -182,6 +190,8 @@ Trajectory trajectory_through(std::vector<double> times_s, std::vector<Eigen::Ve
                               const std::string& source) {
   if (times_s.size() < 2 || times_s.size() != features.size())
     throw InputError(source, "expected at least two rows of time_s,s_rad,r_px,l_px,d_px or time_s,x_m,y_m,z_m");
+  std::vector<bool> rests;  // from a row to one that is equal as it is given
+  for (std::size_t row = 1; row < features.size(); ++row) rests.push_back(features[row] == features[row - 1]);
   for (std::size_t row = 0; row < times_s.size(); ++row) {
     require_finite_features("features", features[row]);
     if (!std::isfinite(times_s[row]) || (row > 0 && !(times_s[row] > times_s[row - 1])))
@@ -194,9 +204,10 @@ Trajectory trajectory_through(std::vector<double> times_s, std::vector<Eigen::Ve
   if (!(start_s >= 0 && start_s <= latest_start_s))
     throw InputError(source, "row 1.time_s", std::to_string(start_s),
                      "seconds since the start of the motion, 0 to 3600: subtract the first row's time from all");
-  return between(start_s, end_s, [spline = natural_spline(std::move(times_s), std::move(features))](double time_s) {
-    return spline_at(spline, time_s);
-  });
+  return between(start_s, end_s,
+                 [spline = natural_spline(std::move(times_s), std::move(features), std::move(rests))](double time_s) {
+                   return spline_at(spline, time_s);
+                 });
 }
 
 Trajectory tip_set_point(const TipGoal& goal, const std::string& source) {

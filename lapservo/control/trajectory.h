@@ -56,7 +56,8 @@ Trajectory sinusoids(const Sinusoids& sinusoids);
 Trajectory via_points(const std::vector<Eigen::Vector4d>& points, const Eigen::Vector4d& max_rate, double dwell_s = 0);
 
 /// Natural cubic spline (twice continuously differentiable) through two points or more with times that increase, the
-/// first between 0 and 3600 s, where it rests until then. s is unwrapped. Throws InputError naming `source`, row and
+/// first between 0 and 3600 s, where it rests until then. Between neighbouring points that are equal in all values it
+/// rests, too: there its acceleration steps. s is unwrapped. Throws InputError naming `source`, row and
 /// field.
 Trajectory trajectory_through(std::vector<double> times_s, std::vector<Eigen::Vector4d> features,
                               const std::string& source);

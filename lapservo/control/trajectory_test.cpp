@@ -1,5 +1,6 @@
 #include "lapservo/control/trajectory.h"
 
+#include <array>
 #include <cmath>
 #include <string>
 
@@ -79,6 +80,24 @@ TEST(Trajectory, CsvIsASmoothCurveThroughItsRows) {
   }
   EXPECT_EQ(trajectory.at(99).features, trajectory.at(10).features);
   EXPECT_TRUE(trajectory.at(99).rate.isZero());
+}
+
+TEST(Trajectory, RestsBetweenRowsThatAreEqual) {
+  const Trajectory trajectory = trajectory_from_csv_text(
+      "time_s,s_rad,r_px,l_px,d_px\n0,3,700,300,200\n10,3,700,300,200\n11,-3,650,300,200\n13,-3,650,300,200\n"
+      "14,-3,650,300,200\n15,-3,680,300,200\n",
+      "t");
+  for (const auto& [start_s, end_s, r_px] : {std::array{0.0, 10.0, 700.0}, {11.0, 14.0, 650.0}})
+    for (double t = start_s; t <= end_s; t += 0.25) {
+      EXPECT_EQ(trajectory.at(t).features[1], r_px) << t;
+      EXPECT_LT(trajectory.at(t).rate.norm() + (t < end_s ? trajectory.at(t).acceleration.norm() : 0), 1e-9) << t;
+    }
+  // Clamped at both ends, and at one with a natural one: their cubics by hand.
+  EXPECT_NEAR(trajectory.at(10.25).features[1], 700 - 50 * (3 * 0.0625 - 2 * 0.015625), 1e-9);
+  EXPECT_NEAR(trajectory.at(10.5).features[0], pi, 1e-9);
+  EXPECT_NEAR(trajectory.at(14.5).features[1], 650 + 30 * (1.5 * 0.25 - 0.5 * 0.125), 1e-9);
+  expect_consistent(trajectory, 10.001, 10.999);
+  expect_consistent(trajectory, 14.001, 14.999);
 }
 
 TEST(Trajectory, BadInputIsNamed) {
