@@ -260,9 +260,10 @@ class Explainer {
 };
 
 // Faults to try: of those with a size, the ones that a fit without them sees; all where there is no such fit.
-std::vector<JointFault> possible_faults(const Joints& joints, const std::vector<TimedPose>& poses, const ArmFit* fit) {
+std::vector<JointFault> possible_faults(const Joints& joints, const std::vector<TimedPose>& poses, double delay_s,
+                                        const ArmFit* fit) {
   std::vector<JointFault> faults = other_joint_faults(joints);
-  const auto sized = sized_joint_faults(joints, poses);
+  const auto sized = sized_joint_faults(joints, poses, delay_s);
   if (!fit) faults.insert(faults.end(), sized.begin(), sized.end());
   if (!fit) return faults;
   const Departures& departures = fit->fit.departures;
@@ -275,7 +276,7 @@ std::vector<JointFault> possible_faults(const Joints& joints, const std::vector<
 
 std::optional<ArmFit> fit_arm(const Instrument& instrument, const ArmStart& start, const JointRecording& recording,
                               const ArmFaults& free, const AtIteration& at_iteration) {
-  auto faults = sized_joint_faults(instrument.joints.value(), start.poses);
+  auto faults = sized_joint_faults(instrument.joints.value(), start.poses, start.delay_s);
   std::erase_if(faults, [&](const JointFault& held) {
     return std::ranges::any_of(free.joints, [&](const JointFault& fault) { return fault.text(0) == held.text(0); });
   });
@@ -307,7 +308,9 @@ std::string explaining_fault(const Instrument& instrument, const std::vector<Tim
                              const AtIteration& at_iteration) {
   if (poses.size() < min_registration_poses) return {};
   Explainer explainer(instrument, poses, recording, source, at_iteration);
-  for (const JointFault& fault : possible_faults(instrument.joints.value(), poses, fit))
+  const double delay_s =
+      fit ? fit->model.blocks().delay.of(fit->fit.x)[0] : start_arm(instrument, poses, recording, source).delay_s;
+  for (const JointFault& fault : possible_faults(instrument.joints.value(), poses, delay_s, fit))
     for (const double start : fault.starts)
       if (explainer.try_fault(fault, start) && fault.is_linear) break;
   // It explains them when little is left by the images' noise or beside what there was, and much less somewhere.

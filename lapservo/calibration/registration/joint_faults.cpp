@@ -84,7 +84,8 @@ std::vector<double> clock_starts(double images_per_s) {
   return starts;
 }
 
-JointFault lost_frames_fault(double from_s) {
+// `from_s`: a frame's stamp; `delay_s`: by which it is later than the joints' clock.
+JointFault lost_frames_fault(double from_s, double delay_s) {
   constexpr double least_lost_s = 8e-3;  // half a frame of the fastest cameras
   return {[=](double size) {
             return fmt::format(
@@ -92,10 +93,10 @@ JointFault lost_frames_fault(double from_s) {
                 "lost frames",
                 from_s, 1e3 * std::abs(size), size < 0 ? "too early" : "too late", size < 0 ? "missing" : "repeated");
           },
-          [from_s](JointRecording& r, double size) {
+          [from_s, delay_s](JointRecording& r, double size) {
             double last_s = r.time_s.front();
             for (double& time_s : r.time_s) {
-              if (time_s > from_s) time_s = std::max(time_s + size, last_s + 1e-6);
+              if (time_s > from_s - delay_s) time_s = std::max(time_s + size, last_s + 1e-6);
               last_s = time_s;
             }
           },
@@ -165,7 +166,7 @@ JointFault clock_fault(const std::vector<TimedPose>& poses) {
       1e-4, 0, clock_starts(1 / period_s)};
 }
 
-std::vector<JointFault> sized_joint_faults(const Joints& joints, const std::vector<TimedPose>& poses) {
+std::vector<JointFault> sized_joint_faults(const Joints& joints, const std::vector<TimedPose>& poses, double delay_s) {
   constexpr int parts = 8;
   std::vector<JointFault> faults;
   for (std::size_t j = 0; j < 4; ++j) {
@@ -175,7 +176,8 @@ std::vector<JointFault> sized_joint_faults(const Joints& joints, const std::vect
   }
   faults.push_back(clock_fault(poses)), faults.push_back(focal_fault());
   const double first_s = poses.front().time_s, span_s = poses.back().time_s - first_s;
-  for (int part = 1; part < parts; ++part) faults.push_back(lost_frames_fault(first_s + span_s * part / parts));
+  for (int part = 1; part < parts; ++part)
+    faults.push_back(lost_frames_fault(first_s + span_s * part / parts, delay_s));
   return faults;
 }
 

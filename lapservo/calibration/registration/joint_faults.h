@@ -35,8 +35,8 @@ std::vector<TimedPose> with_focal(std::vector<TimedPose> poses, double longer);
 JointFault clock_fault(const std::vector<TimedPose>& poses);
 
 /// Scales, couplings and times of the joints, the clock, frames that are lost, the focal length: faults with a size, of
-/// which 0 is none.
-std::vector<JointFault> sized_joint_faults(const Joints& joints, const std::vector<TimedPose>& poses);
+/// which 0 is none. `delay_s`: by how much the frames' stamps are later than the joints' clock.
+std::vector<JointFault> sized_joint_faults(const Joints& joints, const std::vector<TimedPose>& poses, double delay_s);
 
 /// Columns that are exchanged, angles that wrap, readings that are held.
 std::vector<JointFault> other_joint_faults(const Joints& joints);

@@ -12,6 +12,7 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/calibration/recording/joint_recording.h"
+#include "lapservo/calibration/registration/joint_faults.h"
 #include "lapservo/calibration/registration/registration_measurement.h"
 #include "lapservo/calibration/registration/test_motion.h"
 #include "lapservo/core/angles.h"
@@ -227,6 +228,24 @@ TEST(RegisterArm, RefusesWhatCanNotTell) {
   EXPECT_TRUE(has(registered_from_names(few).refusal, "found in 0 frames"));
   few.poses.assign(data.poses.begin(), data.poses.begin() + 10);
   EXPECT_TRUE(has(registered_from_names(few).refusal, "found in 10 frames"));
+}
+
+TEST(JointFaults, LostFramesAreMendedAtTheirTimeByTheJointsClock) {
+  const Recorded data = recorded({.delay_s = 0});
+  for (const double delay_s : {-20.0, 0.1, 25.0}) {
+    std::vector<TimedPose> poses = data.poses;
+    for (TimedPose& pose : poses) pose.time_s += delay_s;
+    int part = 0;
+    for (const JointFault& fault : sized_joint_faults(*data.truth.joints, poses, delay_s)) {
+      if (!has(fault.text(-0.5), "frames are missing")) continue;
+      JointRecording mended = data.recording;
+      fault.mend(mended, -0.5);
+      const auto first = std::ranges::mismatch(mended.time_s, data.recording.time_s).in2;
+      ASSERT_NE(first, data.recording.time_s.end());
+      EXPECT_NEAR(*first, 20.0 * ++part / 8, 0.02) << delay_s;
+    }
+    EXPECT_EQ(part, 7);
+  }
 }
 
 // As far from the configuration as readings are taken.
