@@ -700,6 +700,13 @@ TEST_F(CommandLine, CalibrationsAndRecordingsRefuseWhatTheyWouldIgnore) {
   expect_refused("sample in", {"in: is not empty, expected a new or an empty folder"});
   const std::string to = " --rig configs/example.yaml --out out/rig.yaml";
   expect_refused("calibrate registration in/seen.csv --fps 8" + to, {"--fps: is of frames", "a CSV"});
+  const std::string table = "calibrate registration " + in("seen.csv", "time_s\n") + to;
+  for (const std::string idle : {"--endoscope ros2:ECM", "--reference-frame camera"})
+    expect_refused(table + " " + idle, {idle.substr(0, idle.find(' ')), "expected --base-frame"});
+  expect_refused(table + " --endoscope ros2:ECM --base-frame out/base.json --reference-frame camera",
+                 {"--reference-frame", "expected none with --endoscope"});
+  for (const std::string of_joints : {"--set-base-frame ros2:PSM1", "--base-frame out/base.json"})
+    expect_refused(table + " " + of_joints, {of_joints.substr(0, of_joints.find(' ')) + ": needs the arm's joints"});
   expect_refused("calibrate tip --calliper 20 --eye left" + to, {"--eye", "--pivot"});
   expect_refused("calibrate tip --calliper 20 --deinterlace" + to, {"--deinterlace", "--touch"});
   expect_refused("calibrate tip --pivot in/tip --board 9x6" + to, {"--board", "--touch"});

@@ -40,12 +40,22 @@ void add_dvrk_options(Command command, DvrkOptions& options) {
                      "Also write what dVRK takes as JSON: the arm's base_frame for system.json; with --endoscope its "
                      "entry of suj-fixed.json");
   command.add_option("--reference-frame", options.reference_frame,
-                     "Name of the base frame's reference: the camera's frame in dVRK's convention (x left, y up)");
+                     "Name of the base frame's reference, without --endoscope: the camera's frame in dVRK's convention "
+                     "(x left, y up)");
   command.add_option("--endoscope", options.endoscope,
-                     "The arm that held the endoscope during the recording and still stands there: ros2:ECM, ros1:ECM");
+                     "With --base-frame: the arm that held the endoscope during the recording and still stands there: "
+                     "ros2:ECM, ros1:ECM");
   command.add_option(
       "--set-base-frame", options.set_base_frame,
       "Also publish it on this arm's set_base_frame: ros2:PSM1, ros1:PSM1; not while it is teleoperated");
+}
+
+// Options that would be ignored.
+void refuse_idle(const DvrkOptions& options, const Command& command) {
+  if (options.base_frame.empty() && options.set_base_frame.empty())
+    command.refuse({"--endoscope", "--reference-frame"}, "is of dVRK's base frame, expected --base-frame with it");
+  if (!options.endoscope.empty())
+    command.refuse({"--reference-frame"}, "is not in an entry of suj-fixed.json, expected none with --endoscope");
 }
 
 // Before the job: throws InputError for what can't be done, and reads where the ECM stands. Then write().
@@ -54,7 +64,8 @@ class DvrkOutput {
   // `has_joints`: whether the recording has them.
   DvrkOutput(const DvrkOptions& options, bool has_joints) : options_(options) {
     if (!has_joints && !(options.base_frame.empty() && options.set_base_frame.empty()))
-      throw InputError("--base-frame", "needs the arm's joints, expected --joints or a bag with them");
+      throw InputError(options.base_frame.empty() ? "--set-base-frame" : "--base-frame",
+                       "needs the arm's joints, expected --joints or a bag with them");
     if (!options.set_base_frame.empty()) {
       if (!options.endoscope.empty())
         throw InputError("--set-base-frame",
@@ -194,6 +205,7 @@ void add_calibrate_registration(Command parent) {
   const auto job = [](const CalibrateOptions& options, const Command& command) {
     if (is_table(options.input))
       command.refuse(frame_option_names(), "is of frames, and a CSV of observations has none");
+    refuse_idle(options.dvrk, command);
     return calibrate_registration(options);
   };
   auto [command, options] = parent.add_subcommand<CalibrateOptions>(
