@@ -7,7 +7,9 @@
 #include <fmt/format.h>
 
 #include "lapservo/calibration/check/frame_diagnosis.h"
+#include "lapservo/calibration/marker/frame_fit.h"
 #include "lapservo/core/angles.h"
+#include "lapservo/core/dense_matrix.h"
 #include "lapservo/core/error.h"
 #include "lapservo/core/statistics.h"
 #include "lapservo/kinematics/rcm_kinematics.h"
@@ -18,9 +20,9 @@ namespace {
 
 constexpr std::size_t min_seam_frames = 8;
 
-std::optional<double> psi_at(const JointRecording& recording, const Joints& joints, double time_s) {
-  const auto at = recording.at(time_s);
-  return at ? std::optional(q_from_joints(joints, Eigen::Vector4d(at->data()))[3]) : std::nullopt;
+// Where the recording has that time.
+double psi_at(const JointRecording& recording, const Joints& joints, double time_s) {
+  return q_from_joints(joints, Eigen::Vector4d(recording.at(time_s).value().data()))[3];
 }
 
 // psi in the RCM's azimuths of a shaft in a free pose: its axis as theta and phi have it, its turn about that.
@@ -105,44 +107,57 @@ SeamRegistration register_seam(const Instrument& instrument, const MarkerCalibra
                                const JointRecording& recording) {
   SeamRegistration result;
   const Marker& marker = calibration.marker;
-  std::vector<double> differences;
+  std::vector<double> times_s, seen_rad;
   double first_s = 1e300, last_s = -1e300;
   for (const KeyFrame& frame : calibration.key_frames) {
     const double time_s = frame.time_s - instrument.image_delay_s.value_or(0);
     first_s = std::min(first_s, time_s), last_s = std::max(last_s, time_s);
-    if (const auto psi_rad = psi_at(recording, instrument.joints.value(), time_s))
-      differences.push_back(psi_of(frame.sighting.unknowns.pose(), instrument.camera_from_rcm.value()) - *psi_rad);
+    if (!recording.at(time_s)) continue;
+    times_s.push_back(time_s);
+    seen_rad.push_back(psi_of(frame.sighting.unknowns.pose(), instrument.camera_from_rcm.value()));
   }
-  result.frames = differences.size();
-  if (differences.size() < min_seam_frames) {
+  result.frames = times_s.size();
+  if (times_s.size() < min_seam_frames) {
     result.refusal = fmt::format(
         "{} frames lie within the recording of the joints, at least {} are needed: the frames run from {:.2f} to "
         "{:.2f} s, the recording from {:.2f} to {:.2f} s",
-        differences.size(), min_seam_frames, first_s, last_s, recording.time_s.front(), recording.time_s.back());
+        times_s.size(), min_seam_frames, first_s, last_s, recording.time_s.front(), recording.time_s.back());
     return result;
   }
-  // About the direction of most, then the median, then the mean of what is near it.
+  const JointRecording readings = refined(recording, 5e-3);
+  const auto differences = [&](double about_rad, double gap_rad) {
+    JointRecording behind = readings;
+    put_behind_gap(behind, 3, gap_rad);
+    std::vector<double> all;
+    for (std::size_t i = 0; i < times_s.size(); ++i)
+      all.push_back(wrap_pi(seen_rad[i] - psi_at(behind, instrument.joints.value(), times_s[i]) - about_rad));
+    return all;
+  };
+  // About the direction of most, then the median, then with the gap.
   double sine = 0, cosine = 0;
-  for (const double d : differences) sine += std::sin(d), cosine += std::cos(d);
-  const double about = std::atan2(sine, cosine);
-  for (double& d : differences) d = wrap_pi(d - about);
-  const double middle = median(differences);
-  std::vector<double> sizes;
-  for (const double d : differences) sizes.push_back(std::abs(d - middle));
-  const double scale = std::max(1e-4, 1.4826 * median(sizes));
-  double sum = 0, squares = 0, count = 0;
-  for (const double d : differences)
-    if (std::abs(d - middle) < 3 * scale) sum += d, squares += d * d, ++count;
-  const double mean = sum / count, variance = std::max(0.0, squares / count - mean * mean);
-  constexpr double widest_rad = 0.2;
-  if (scale > widest_rad) {
+  for (const double d : differences(0, 0)) sine += std::sin(d), cosine += std::cos(d);
+  const double direction_rad = std::atan2(sine, cosine);
+  const double about_rad = direction_rad + median(differences(direction_rad, 0));
+  constexpr double widest_rad = 0.2, step_rad = 1e-4, unit_rad = 1e-3;
+  // The middle of the gap is where registration has the joints' offset. A turn one way leaves the gap open: gaps of up
+  // to 40 mrad are usual (docs/statuses.md).
+  const double gap_sigma_rad = 0.04 / std::sqrt(3.0);
+  std::optional<FrameFit> fit;
+  if (robust_scale(differences(about_rad, 0)) < widest_rad)
+    fit = fit_frames(
+        [&](const Eigen::VectorXd& x) -> Eigen::MatrixXd {
+          const std::vector<double> off_rad = differences(about_rad + x[0], x[1]);
+          return Eigen::RowVectorXd::Map(off_rad.data(), static_cast<Eigen::Index>(off_rad.size())) / unit_rad;
+        },
+        {{0, step_rad}, {0, step_rad, gap_sigma_rad}}, 1);
+  if (!fit) {
     result.refusal =
         "the joints do not turn as the marker does: check joints.sign, the recording's clock and image_delay_s";
     return result;
   }
   // A pose was found with marker.seam_rad: what psi is too large by, the seam lies farther.
-  result.seam_rad = wrap_pi(marker.seam_rad + about + mean);
-  result.sigma_rad = std::sqrt(variance / std::max(1.0, count - 1));
+  result.seam_rad = wrap_pi(marker.seam_rad + about_rad + fit->x[0]);
+  result.sigma_rad = std::sqrt(covariance_at_least(fit->covariance, fit->independent)(0, 0));
   return result;
 }
 

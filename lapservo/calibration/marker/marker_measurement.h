@@ -43,7 +43,8 @@ struct SeamRegistration {
 };
 
 /// The seam by which the poses of the calibrated marker agree with the joints, on average, the rig's camera_from_rcm,
-/// joints and image_delay_s (0 when it has none) taken for right.
+/// joints and image_delay_s (0 when it has none) taken for right. The joints' offset lies in the middle of roll's gap,
+/// which a turn there and back shows; of a turn one way the sigma counts half of a usual gap.
 SeamRegistration register_seam(const Instrument& instrument, const MarkerCalibration& calibration,
                                const JointRecording& recording);
 

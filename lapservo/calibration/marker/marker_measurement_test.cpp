@@ -23,15 +23,19 @@ Instrument instrument_with_joints() {
   return instrument;
 }
 
-// A rotation in 20 s; frames carry poses as a calibration leaves them, with the marker's seam assumed at seam_rad.
+// A rotation in 20 s, one way or there and back, the instrument behind a gap of roll; frames carry poses as a
+// calibration leaves them, with the marker's seam assumed at seam_rad.
 struct Turn {
   Instrument instrument = instrument_with_joints();
   MarkerCalibration calibration;
   JointRecording recording;
 
-  Turn(double seam_error_rad, double noise_rad) {
+  Turn(double seam_error_rad, double noise_rad, double gap_rad = 0, bool there_and_back = false) {
     Random random(3);
-    const auto psi_at = [](double time_s) { return two_pi * time_s / 20; };
+    const auto psi_at = [=](double time_s) {
+      return there_and_back ? two_pi * (1 - std::abs(time_s / 10 - 1)) : two_pi * time_s / 20;
+    };
+    const auto lag_at = [=](double time_s) { return (there_and_back && time_s > 10 ? -0.5 : 0.5) * gap_rad; };
     for (int i = 0; i < 200; ++i) {
       const double time_s = 0.1 * i;
       recording.time_s.push_back(time_s);
@@ -46,7 +50,7 @@ struct Turn {
       ShaftPose pose{instrument.camera_from_rcm.value() * rcm_from_unrolled(q), 0};
       pose.camera_from_unrolled.rotation =
           pose.camera_from_unrolled.rotation * Eigen::AngleAxisd(turned_rad, Eigen::Vector3d::UnitZ());
-      pose.psi_rad = q.psi_rad - turned_rad + seam_error_rad + noise_rad * random.normal();
+      pose.psi_rad = q.psi_rad - lag_at(time_s) - turned_rad + seam_error_rad + noise_rad * random.normal();
       KeyFrame frame;
       frame.sighting.unknowns = {pose, false};
       frame.time_s = time_s + 0.2;
@@ -60,12 +64,22 @@ auto seam_of(const Turn& turn) {
 }
 
 TEST(RegisterSeam, IsWhereTheJointsSayWhateverThePosesAzimuths) {
-  const Turn turn(0.4, 1e-3);
+  for (const double gap_rad : {0.0, 0.04}) {
+    const Turn turn(0.4, 1e-3, gap_rad, true);
+    const auto seam = seam_of(turn);
+    ASSERT_EQ(seam.refusal, "");
+    EXPECT_NEAR(seam.seam_rad, wrap_pi(turn.calibration.marker.seam_rad + 0.4), 5e-4) << gap_rad;
+    EXPECT_NEAR(seam.sigma_rad, 1e-3 / std::sqrt(60), 7e-5) << gap_rad;
+    EXPECT_EQ(seam.frames, 60U);
+  }
+}
+
+TEST(RegisterSeam, ItsSigmaHoldsTheGapThatATurnOneWayDoesNotShow) {
+  const Turn turn(0.4, 1e-3, 0.04);
   const auto seam = seam_of(turn);
   ASSERT_EQ(seam.refusal, "");
-  EXPECT_NEAR(seam.seam_rad, wrap_pi(turn.calibration.marker.seam_rad + 0.4), 5e-4);
-  EXPECT_NEAR(seam.sigma_rad, 1e-3 / std::sqrt(60), 5e-5);
-  EXPECT_EQ(seam.frames, 60U);
+  EXPECT_NEAR(seam.seam_rad, wrap_pi(turn.calibration.marker.seam_rad + 0.4), 2 * seam.sigma_rad);
+  EXPECT_NEAR(seam.sigma_rad, 0.02 / std::sqrt(3.0), 1e-3);
 }
 
 TEST(RegisterSeam, RefusesRecordingsOfOtherTimesAndOtherTurns) {

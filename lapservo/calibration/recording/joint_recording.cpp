@@ -8,6 +8,7 @@
 #include <fmt/ranges.h>
 
 #include "lapservo/core/error.h"
+#include "lapservo/robot/backlash.h"
 
 namespace lapservo::internal {
 namespace {
@@ -122,6 +123,16 @@ JointRecording refined(const JointRecording& r, double step_s) {
   }
   fine.time_s.push_back(r.time_s.back()), fine.joints.push_back(r.joints.back());
   return fine;
+}
+
+void put_behind_gap(JointRecording& recording, std::size_t joint, double width) {
+  const double size = std::abs(width);
+  Backlash gap(recording.joints.front()[joint]);
+  for (auto& joints : recording.joints) {
+    gap.follow(joints[joint], size);
+    const double behind = gap.instrument(size) - joints[joint];
+    joints[joint] += width < 0 ? -behind : behind;
+  }
 }
 
 }  // namespace lapservo::internal

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -58,5 +59,9 @@ Joints joints_of(const Instrument& instrument, const std::vector<std::string>& r
 
 /// The same motion in steps of at most `step_s`, smooth through the rows (Catmull and Rom's cubic); pauses stay.
 JointRecording refined(const JointRecording& recording, double step_s);
+
+/// Turns a joint's readings into where the instrument is behind a gap of this width, in whose middle it begins. A width
+/// below 0 is an instrument that leads as one above 0 lets it lag: derivatives go through 0.
+void put_behind_gap(JointRecording& recording, std::size_t joint, double width);
 
 }  // namespace lapservo::internal

@@ -14,7 +14,6 @@
 #include "lapservo/geometry/rotation.h"
 #include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/rig/joint_conversion.h"
-#include "lapservo/robot/backlash.h"
 
 namespace lapservo::internal {
 
@@ -105,22 +104,13 @@ Eigen::MatrixXd ArmModel::residuals(const Eigen::VectorXd& x) const {
   return all;
 }
 
-// A width below 0 is an instrument that leads as one above 0 lets it lag: derivatives go through 0.
 JointRecording ArmModel::behind_backlash(const Eigen::VectorXd& x) const {
   JointRecording instrument = recording_;
   for (std::size_t k = 0; k < faults_.size(); ++k)
     if (const double size = blocks_.joints.of(x)[static_cast<Eigen::Index>(k)]; size != 0 && faults_[k].mend)
       faults_[k].mend(instrument, size);
-  for (std::size_t k = 0; k < moving_.size(); ++k) {
-    const std::size_t j = moving_[k];
-    const double width = blocks_.backlash.of(x)[static_cast<Eigen::Index>(k)], size = std::abs(width);
-    Backlash gap(instrument.joints.front()[j]);
-    for (auto& joints : instrument.joints) {
-      gap.follow(joints[j], size);
-      const double behind = gap.instrument(size) - joints[j];
-      joints[j] += width < 0 ? -behind : behind;
-    }
-  }
+  for (std::size_t k = 0; k < moving_.size(); ++k)
+    put_behind_gap(instrument, moving_[k], blocks_.backlash.of(x)[static_cast<Eigen::Index>(k)]);
   return instrument;
 }
 
