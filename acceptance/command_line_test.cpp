@@ -710,6 +710,7 @@ TEST_F(CommandLine, CalibrationsAndRecordingsRefuseWhatTheyWouldIgnore) {
   expect_refused("calibrate tip --calliper 20 --eye left" + to, {"--eye", "--pivot"});
   expect_refused("calibrate tip --calliper 20 --deinterlace" + to, {"--deinterlace", "--touch"});
   expect_refused("calibrate tip --pivot in/tip --board 9x6" + to, {"--board", "--touch"});
+  expect_refused("calibrate tip --calliper 20 --joint-topic /js" + to, {"--joint-topic", "--pivot"});
   const std::string record = "record --camera ros2:/image --out out/bag ";
   for (const std::string idle : {"--instrument PSM1", "--scale 3", "--setpoint-readers 2", "--enable-motion"})
     expect_refused(record + idle, {idle.substr(0, idle.find(' ')), "expected --move"});

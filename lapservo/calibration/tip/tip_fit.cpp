@@ -83,13 +83,38 @@ bool is_bent_differently(const std::vector<TipSighting>& sightings) {
   return false;
 }
 
+// Of each joint.
+std::vector<double> mean_reading(const std::vector<TipSighting>& sightings) {
+  std::vector<double> mean_rad(sightings.front().wrist_rad.size(), 0.0);
+  for (const TipSighting& sighting : sightings)
+    for (std::size_t joint = 0; joint < mean_rad.size(); ++joint)
+      mean_rad[joint] += sighting.wrist_rad[joint] / static_cast<double>(sightings.size());
+  return mean_rad;
+}
+
+// How far a wrist has its tip from where other readings have it; whatever its place.
+double moved_m(Tool tool, const std::vector<double>& from_rad, const std::vector<double>& to_rad) {
+  tool.place.emplace();
+  const auto tip_at = [&](const std::vector<double>& wrist_rad) {
+    return tip_in_marker(tool, wrist_rad).marker_from_tip.translation;
+  };
+  return (tip_at(to_rad) - tip_at(from_rad)).norm();
+}
+
+// A wrist that is bent alike in all sightings counts as rigid at the mean of its readings: what they differ by is noise
+// of the points.
 class TipModel {
  public:
   TipModel(const Tool& tool, const std::vector<TipSighting>& sightings, const TipWay& way, double azimuth_rad)
-      : tool_(tool), sightings_(sightings), is_bent_(is_bent_differently(sightings)) {
+      : tool_(tool),
+        sightings_(sightings),
+        mean_rad_(mean_reading(sightings)),
+        is_bent_(is_bent_differently(sightings)) {
     const Eigen::Matrix<double, 6, 1> start_m = start();
-    for (const TipSighting& sighting : sightings)
-      in_sigmas_.push_back(in_sigmas(sighting.pose, start_m.head<3>(), way.sigma_point_m));
+    for (const TipSighting& sighting : sightings) {
+      const double off_m = is_bent_ ? 0 : moved_m(tool, mean_rad_, sighting.wrist_rad);
+      in_sigmas_.push_back(in_sigmas(sighting.pose, start_m.head<3>(), std::hypot(way.sigma_point_m, off_m)));
+    }
     std::vector<Unknown> place;
     for (Eigen::Index i = 0; i < 3; ++i) place.push_back({start_m[i], step_m});
     if (is_bent_) {
@@ -134,7 +159,7 @@ class TipModel {
 
   Tool tool_at(const Eigen::VectorXd& x, const Eigen::MatrixXd& covariance) const {
     const Eigen::MatrixXd of_place = place_.of(covariance);
-    if (!is_bent_) return placed_by_tip(tool_, sightings_.front().wrist_rad, x.head<3>(), of_place);
+    if (!is_bent_) return placed_by_tip(tool_, mean_rad_, x.head<3>(), of_place);
     Tool tool = bent(x);
     tool.place->covariance.topLeftCorner(place_.size, place_.size) = of_place;
     return tool;
@@ -170,6 +195,7 @@ class TipModel {
 
   const Tool& tool_;
   const std::vector<TipSighting>& sightings_;
+  std::vector<double> mean_rad_;
   bool is_bent_;
   std::vector<Eigen::Matrix3d> in_sigmas_;
   std::vector<const Eigen::Matrix3Xd*> moves_;  // of the faults' components
@@ -394,6 +420,24 @@ TipCalibration pivoted_tip(const Tool& tool, const std::vector<double>& wrist_ra
                       "is it in its dimple all the time, is the wrist held straight, does anything else move", to_do});
   }
   return result;
+}
+
+TipCalibration pivoted_tip(const Tool& tool, const std::vector<TipSighting>& sightings) {
+  TipCalibration result;
+  if (sightings.empty())
+    return result.refusal = "no frame with the marker has readings of the wrist's joints: record both at once", result;
+  const std::vector<double> mean_rad = mean_reading(sightings);
+  std::vector<TimedPose> poses;
+  for (const TipSighting& sighting : sightings) {
+    poses.push_back(sighting.pose);
+    for (std::size_t i = 0; i < mean_rad.size(); ++i)
+      if (std::abs(sighting.wrist_rad[i] - mean_rad[i]) > tool.wrist[i].sigma_reading_rad)
+        return result.refusal =
+                   fmt::format("{} is at {:.3f} rad at {:.1f} s, but at {:.3f} rad on average: {}", tool.wrist[i].name,
+                               sighting.wrist_rad[i], sighting.pose.time_s, mean_rad[i], hold_wrist),
+               result;
+  }
+  return pivoted_tip(tool, mean_rad, poses);
 }
 
 TipCalibration touched_tip(const Tool& tool, const std::vector<TipSighting>& touches,

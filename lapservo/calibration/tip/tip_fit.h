@@ -35,7 +35,11 @@ struct TipCalibration {
 /// wrist. Errors of the poses are alike over a second.
 TipCalibration pivoted_tip(const Tool& tool, const std::vector<double>& wrist_rad, const std::vector<TimedPose>& poses);
 
-/// From touches of points that lie still, in the order of `names`: five or more. A tip stands on its point to 0.1 mm.
+/// The same at the mean of the sightings' readings. Refused where a joint is farther from it than sigma_reading_rad.
+TipCalibration pivoted_tip(const Tool& tool, const std::vector<TipSighting>& sightings);
+
+/// From touches of points that lie still, in the order of `names`: five or more. A tip stands on its point to 0.1 mm. A
+/// wrist that is bent alike in all of them is placed at the mean of its readings.
 TipCalibration touched_tip(const Tool& tool, const std::vector<TipSighting>& touches,
                            const std::vector<std::string>& names);
 

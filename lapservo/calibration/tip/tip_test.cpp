@@ -177,6 +177,19 @@ TEST(PivotedTip, IsRefusedWhereItDoesNotTurnEnough) {
   expect_refused({.seconds = 1}, "frames");
 }
 
+TEST(PivotedTip, IsPlacedAtTheReadingsOfItsWristAndRefusedWhereTheyMove) {
+  const std::vector<double> bent_rad{0.15, -0.1};
+  std::vector<TipSighting> sightings;
+  const Pivoted recording = pivoted(1, {});
+  for (const TimedPose& pose : recording.poses) sightings.push_back({pose, bent_rad});
+  const TipCalibration found = pivoted_tip(wristed(), sightings);
+  ASSERT_EQ(found.refusal, "");
+  EXPECT_LT((tip_in_marker(found.tool, bent_rad).marker_from_tip.translation - recording.tip_in_marker_m).norm(), 3e-4);
+  sightings[7].wrist_rad[1] += 0.02;  // the sigma of a reading is 0.0175
+  EXPECT_TRUE(has(pivoted_tip(wristed(), sightings).refusal, "wrist_yaw is at -0.080 rad at 1.2 s"));
+  EXPECT_TRUE(has(pivoted_tip(wristed(), std::vector<TipSighting>()).refusal, "no frame"));
+}
+
 struct Touched {
   Tool truth;
   std::vector<TipSighting> touches;
@@ -222,6 +235,31 @@ TEST(TouchedTip, IsFoundAsWellAsItsSigmaSays) {
                  found.tool.place->covariance.topLeftCorner<3, 3>());
   }
   straight.expect(0.15);
+}
+
+// The readings of the first touch are off: the others have the tip where it is, and the base behind it.
+TEST(TouchedTip, OfAWristThatIsBentAlikeIsPlacedAtTheMeanOfItsReadings) {
+  for (std::uint64_t seed = first_seed; seed <= last_seed; ++seed) {
+    Touched recording = touched(seed, wristed(), 10, 0);
+    recording.touches[0].wrist_rad = {-0.05, 0};
+    const TipCalibration found = touched_tip(recording.truth, recording.touches, recording.names);
+    ASSERT_EQ(found.refusal, "") << seed;
+    ASSERT_FALSE(found.with_offsets);
+    const Eigen::Vector3d off_m = found.tool.place->base_in_marker_m - recording.truth.place->base_in_marker_m;
+    EXPECT_LT(off_m.norm(), 0.4e-3) << seed;  // by the readings of the first touch 0.96 mm
+  }
+}
+
+TEST(TouchedTip, CountsHowFarReadingsOfAWristThatIsBentAlikeMoveTheTip) {
+  Errors tips;
+  for (std::uint64_t seed = first_seed; seed <= last_seed; ++seed) {
+    const Touched recording = touched(seed, wristed(), 10, 0.04);
+    const TipCalibration found = touched_tip(recording.truth, recording.touches, recording.names);
+    ASSERT_EQ(found.refusal, "") << seed;
+    tips.add(found.tool.place->base_in_marker_m - recording.truth.place->base_in_marker_m,
+             found.tool.place->covariance.topLeftCorner<3, 3>());
+  }
+  EXPECT_LT(rms(tips.sigmas), 1.4);
 }
 
 TEST(TouchedTip, ShowsTheWristsOffsetsWhereItIsBent) {

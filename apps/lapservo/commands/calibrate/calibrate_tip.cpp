@@ -1,6 +1,7 @@
 #include <cmath>
 #include <cstdio>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -9,6 +10,7 @@
 #include "apps/lapservo/cli/subcommands.h"
 #include "apps/lapservo/commands/calibrate/calibrate_inputs.h"
 #include "apps/lapservo/inputs/frame_input.h"
+#include "apps/lapservo/inputs/joint_input.h"
 #include "lapservo/calibration/camera/camera_measurement.h"
 #include "lapservo/calibration/registration/registration_measurement.h"
 #include "lapservo/calibration/tip/tip_fit.h"
@@ -31,12 +33,23 @@ struct CalibrateTipOptions : CalibrateOptions {
 
 TipCalibration by_pivot(const CalibrateTipOptions& options, const Rig& rig, std::size_t index, const Tool& tool) {
   const auto frames = open_frames(options.input, options, &rig.camera);
+  const WristInput wrist = find_wrist_input(options.input, "", options.joint_topic, rig, index, frames.get());
   const MeasuredPoses poses = poses_in_frames(rig, index, {*frames, options.input, options.deinterlace}, watched_job());
   TipCalibration refused;
   refused.refusal = poses.read.stopped ? "stopped" : poses.none;
   if (!refused.refusal.empty()) return refused;
   say_complaint(options.input, poses.read.complaint);
-  return pivoted_tip(tool, std::vector<double>(tool.wrist.size(), 0), poses.all);
+  if (tool.wrist.empty()) return pivoted_tip(tool, std::vector<double>(), poses.all);
+  if (!wrist.readings) {
+    std::printf("the joints of the wrist count as 0 rad: %s has no readings that are theirs for certain\n",
+                options.input.c_str());
+    return pivoted_tip(tool, std::vector<double>(tool.wrist.size(), 0), poses.all);
+  }
+  std::vector<TipSighting> sightings;
+  for (const TimedPose& pose : poses.all)
+    if (auto wrist_rad = wrist_at(wrist, rig.instruments[index], pose.time_s); !wrist_rad.empty())
+      sightings.push_back({pose, std::move(wrist_rad)});
+  return pivoted_tip(tool, sightings);
 }
 
 TipCalibration by_touch(const CalibrateTipOptions& options, const Rig& rig, std::size_t index, const Tool& tool) {
@@ -96,6 +109,7 @@ int calibrate_tip(CalibrateTipOptions options, const Command& command) {
     command.refuse({"--board", "--square-mm", "--aruco", "--marker-mm"}, "is of a board, expected --touch with it");
   if (!options.calliper.empty())
     command.refuse(frame_option_names(), "is of images, expected --pivot or --touch with it");
+  if (options.pivot.empty()) command.refuse({"--joint-topic"}, "is of a bag, expected --pivot with it");
   options.input = options.pivot + options.touches;  // the one that is given
   Rig rig = load_rig(options.rig);
   const std::size_t index = instrument_meant(rig, options.instrument, options.rig);
@@ -122,7 +136,7 @@ void add_calibrate_tip(Command parent) {
   command.add_option(
       "--pivot", options.pivot,
       "The tip rests in a dimple, its wrist straight, while the shaft is tilted to all sides and rolled: "
-      "a folder, a video, a bag, a camera or a stream of 20 s");
+      "a folder, a video, a bag (which brings the wrist's readings along), a camera or a stream of 20 s");
   command.add_option("--touch", options.touches,
                      "CSV of images of touches: file, column and row of the inner corner of a board that the tip is "
                      "on, and a column in rad for each joint of the wrist; an image without column and row shows the "
@@ -131,6 +145,7 @@ void add_calibrate_tip(Command parent) {
                      "MM[:SIGMA]: distance of the marker's distal edge from the wrist's axis, or from a straight "
                      "tool's tip, by callipers; sigma is 0.1 mm if not given");
   add_board_options(command, options.board, false);
+  add_joint_topic_option(command, options.joint_topic);
   add_calibrate_options(command, options);
   command.footer(
       "The rig's camera and marker must be calibrated; a rig without a tool gets a straight one. With --pivot, tilt "
