@@ -10,6 +10,7 @@
 
 #include "lapservo/control/newton_inverse.h"
 #include "lapservo/core/angles.h"
+#include "lapservo/core/dense_matrix.h"
 #include "lapservo/core/error.h"
 #include "lapservo/kinematics/tip_kinematics.h"
 #include "lapservo/servo/image_features.h"
@@ -23,6 +24,7 @@ constexpr double nearest_m = 0.01;         // before the camera
 constexpr double step_s = 0.02;            // of differences by time
 constexpr double correction_time_s = 0.3;  // of the mean over images
 constexpr double wrist_time_s = 0.02;      // over which its readings count for how it moves
+constexpr double largest_sigma_m = 3e-3;   // of the tip by its tool: that of a place that is registered
 
 Eigen::Vector4d difference(const JointVector& from, const JointVector& to) {
   Eigen::Vector4d step = to.vector() - from.vector();
@@ -44,8 +46,14 @@ void TipGoals::refuse_incomplete(const std::string& source, bool has_joints) con
   };
   if (!rig_.instruments[0].camera_from_rcm) refuse("the rig's camera_from_rcm and a method other than uncalibrated");
   if (!tool || !tool->place) refuse("the rig's `tool` with its place");
-  if (!has_joints || wrist_.size() == tool->wrist.size()) return;
-  refuse(fmt::format("the wrist's joints, but the arm does not measure {}", fmt::join(wrist_names(tool), ", ")));
+  if (!has_joints) return;
+  if (wrist_.size() != tool->wrist.size())
+    refuse(fmt::format("the wrist's joints, but the arm does not measure {}", fmt::join(wrist_names(tool), ", ")));
+  if (const double sigma_m = tip_sigma_m(0); sigma_m > largest_sigma_m)
+    refuse(fmt::format(
+        "a tip that is known to {:.0f} mm in the marker's frame, but by the rig's `tool`, bent as it is, it "
+        "is known to {:.2g} mm: lapservo calibrate tip --touch with a bent wrist measures it",
+        1e3 * largest_sigma_m, 1e3 * sigma_m));
 }
 
 void TipGoals::use(const std::optional<Rigid3>& camera_from_rcm) {
@@ -104,6 +112,13 @@ std::optional<Rigid3> TipGoals::marker_from_tip(double ahead_s) const {
   return wrist && tool->place ? std::optional(tip_in_marker(*tool, *wrist).marker_from_tip) : std::nullopt;
 }
 
+double TipGoals::tip_sigma_m(double ahead_s) const {
+  const auto wrist = wrist_rad(ahead_s);
+  const auto& tool = rig_.instruments[0].tool;
+  if (!wrist || !tool->place) return std::numeric_limits<double>::infinity();
+  return std::sqrt(eigenvalues_of_symmetric(tip_in_marker(*tool, *wrist).covariance_m2)[2]);
+}
+
 void TipGoals::see(const ImageMeasurement& image, const Rigid3& camera_from_rcm) {
   const auto tip = marker_from_tip(0);
   if (!tip || !image.found || !image.camera_from_marker) return;
@@ -130,7 +145,8 @@ void TipGoals::see(const ImageMeasurement& image, const Rigid3& camera_from_rcm)
 std::optional<JointVector> TipGoals::configuration(const TipGoal& goal, double ahead_s) const {
   const auto tip = marker_from_tip(ahead_s);
   const double depth_m = goal.position_m.z();
-  if (!tip || !camera_from_rcm_ || !(depth_m > nearest_m)) return std::nullopt;
+  if (!tip || !camera_from_rcm_ || !(depth_m > nearest_m) || tip_sigma_m(ahead_s) > largest_sigma_m)
+    return std::nullopt;
   const Camera& camera = rig_.camera;
   const Marker& marker = rig_.instruments[0].marker;
   const Eigen::Vector3d place_m = depth_m * camera.ray_from_ideal(camera.ideal_from_point(goal.position_m) - off_px_);

@@ -25,11 +25,12 @@ class TipGoals {
   TipGoals(const Rig& rig, const Scales& scales);
 
   /// Throws InputError, naming `source`, where the rig, or the arm's measured joints, lack what a goal of the tip
-  /// needs.
+  /// needs, and where the tool leaves the tip open by more than 3 mm (one sigma) with its wrist as it is.
   void refuse_incomplete(const std::string& source, bool has_joints) const;
 
   /// The same trajectory in features, by all that is known at each call; refers to this. Where no configuration
-  /// holds the tip at the goal, the features rest where they were, and are NaN before the first.
+  /// holds the tip at the goal, or the wrist has bent until its tip is left open by more than 3 mm, the features rest
+  /// where they were, and are NaN before the first.
   Trajectory features_of(const Trajectory& goal);
 
   /// A state of the joints: where the wrist is, how it moves; the psi of a roll that is free until an image has it,
@@ -53,6 +54,8 @@ class TipGoals {
  private:
   std::optional<DesiredFeatures> desired(const Trajectory& goal, double time_s) const;
   std::optional<Rigid3> marker_from_tip(double ahead_s) const;
+  /// In the direction in which the tool leaves it open most.
+  double tip_sigma_m(double ahead_s) const;
   void follow_wrist(const std::vector<double>& now_rad, double time_s);
 
   Rig rig_;

@@ -279,6 +279,32 @@ TEST_F(Refusals, GoalsOutOfReachHaveTheNearestThatIsNot) {
   EXPECT_NE(refused({{NAN, 0, 0.1}}).find("not finite"), std::string::npos);
 }
 
+// Any azimuth is possible, as after a calliper.
+TEST_F(Refusals, ATipThatABentWristLeavesOpenIsNeitherAcceptedNorFollowed) {
+  Tool tool;
+  tool.wrist = {{.name = "wrist_pitch", .alpha_rad = -pi / 2, .theta_rad = -pi / 2},
+                {.name = "wrist_yaw", .alpha_rad = -pi / 2, .a_m = 0.0091, .theta_rad = -pi / 2}};
+  tool.last_from_tip.translation = {0, 0.0102, 0};
+  tool.place.emplace().base_in_marker_m = {0, 0, 0.04};
+  tool.place->covariance(3, 3) = pi * pi / 3;
+  rig.instruments[0].tool = tool;
+  const std::vector<double> straight_rad{0, 0}, bent_rad{0.8, 0};
+  const TipGoal goal{Truth{rig}.tip_at(there, straight_rad)};
+  joints.wrist_rad = straight_rad;
+  EXPECT_EQ(refused(goal), "");
+  joints.wrist_rad = bent_rad;
+  EXPECT_NE(refused(goal).find("known to 25 mm: lapservo calibrate tip --touch"), std::string::npos) << refused(goal);
+
+  TipGoals tips(rig, {});
+  tips.follow(joints_at(0, there, straight_rad));
+  const Trajectory features = tips.features_of(tip_set_point(goal, ""));
+  const Eigen::Vector4d followed = features.at(0).features;
+  EXPECT_LT((followed - feature_model(rig)(there.vector())->features).norm(), 1e-6);
+  tips.follow(joints_at(1, there, bent_rad));
+  EXPECT_EQ(features.at(1).features, followed);
+  EXPECT_TRUE(features.at(1).rate.isZero());
+}
+
 TEST_F(Refusals, SayWhatIsMissing) {
   rig.instruments[0].tool = placed_tool();
   EXPECT_NE(refused({here_m}).find("the arm does not measure wrist_pitch, wrist_yaw"), std::string::npos);
