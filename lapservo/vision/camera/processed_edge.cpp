@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 
 #include "lapservo/vision/edges/blurred_edges.h"
 
@@ -104,11 +105,13 @@ Encoding light_at(const LightTable& table, double value) {
   return {table[i] + (place - static_cast<float>(i)) * step, 255 * step};
 }
 
-// `near`: an index to look from, which stays near the last light's.
+// `near`: an index to look from, which stays near the last light's. Where neighbouring values share a light, to within
+// what has an inverse, it is one of them, with a slope of 0.
 Encoding value_at(const LightTable& table, float light, std::size_t& near) {
   while (near < table.size() - 2 && table[near + 1] < light) ++near;
   while (near > 0 && table[near] > light) --near;
   const float step = table[near + 1] - table[near];
+  if (step < std::numeric_limits<float>::min()) return {static_cast<float>(near) / 255, 0};
   const float fraction = std::clamp((light - table[near]) / step, 0.0F, 1.0F);
   return {(static_cast<float>(near) + fraction) / 255, 1 / (255 * step)};
 }

@@ -75,4 +75,21 @@ TEST(ProcessedEdge, ShowsNothingBelowBlackOrAboveWhite) {
   EXPECT_LE(values.maxCoeff(), 1);
 }
 
+// The lights of the lowest tenth of the values are all 0 in single precision.
+TEST(ProcessedEdge, IsFiniteWhereValuesShareALight) {
+  const LightTable table = Response{Response::Kind::table, 1, {0, 1e-60, 1}, {0, 0.1, 1}}.table();
+  const ProcessingFilters filters(processing_of(everything()), true);
+  const Eigen::Vector3d dark = Eigen::Vector3d::Constant(0.05);
+  for (const Eigen::Vector3d& after : {dark, pink}) {
+    EdgeVector edge;
+    edge << 0, dark, after, 0;
+    const LinearisedEdge model = linearised_edge(table, filters, edge);
+    EXPECT_TRUE(model.values.allFinite());
+    EXPECT_TRUE(model.jacobian.allFinite());
+  }
+  EdgeVector even;
+  even << 0, dark, dark, 0;
+  EXPECT_NEAR(processed_edge(table, filters, even)[0], 12 / 255.0, 1e-3);
+}
+
 }  // namespace lapservo::internal::processed_edge_test
