@@ -78,7 +78,7 @@ double worst_sigma_centre_line_rad(const Marker& marker, const Viewing& viewing,
   constexpr int steps = 16;
   double worst = 0;
   for (int i = 0; i < steps; ++i) {
-    const double tau_rad = two_pi * i / (steps - 0.999);
+    const double tau_rad = marker.covered_rad() * i / (steps - 0.999);
     const double noise_rad = predicted_sigma_centre_line_rad(marker, tau_rad, viewing);
     worst = std::max(worst, print_error_m > 0
                                 ? std::hypot(noise_rad, predicted_print_error_rad(marker, tau_rad, print_error_m))

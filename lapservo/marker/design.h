@@ -24,7 +24,7 @@ struct DesignSpec {
 /// refined; l1 + l2 comes out in tenths of a millimetre. Throws InputError when no such marker fits.
 Marker design_marker(const DesignSpec& spec);
 
-/// The largest predicted_sigma_centre_line_rad over the turn, and predicted_print_error_rad with it.
+/// The largest predicted_sigma_centre_line_rad over the print, and predicted_print_error_rad with it.
 double worst_sigma_centre_line_rad(const Marker& marker, const Viewing& viewing, double print_error_m = 0);
 
 /// Whether l1 : l2 is the same at both edges: then eq. (18) is exact.

@@ -89,13 +89,16 @@ TEST(DesignMarker, RefusesALengthIntoWhichNoBandsFit) {
             "length: no marker: three bands of at least 3.0 mm that change over the turn do not fit into 9.0 mm");
 }
 
-TEST(WorstSigma, IsTheLargestOverTheTurn) {
+TEST(WorstSigma, IsTheLargestOverThePrint) {
   testing::SeededRandom random(seed);
-  for (int i = 0; i < 20; ++i) {
-    const Marker marker = testing::random_linear_marker(random);
+  for (int i = 0; i < 40; ++i) {
+    Marker marker = testing::random_linear_marker(random);
+    if (i % 2 == 1) marker.gap_rad = 0.5;
     double largest = 0;
-    for (int k = 0; k < 2000; ++k)
-      largest = std::max(largest, predicted_sigma_centre_line_rad(marker, two_pi * (k + 0.5) / 2000, {}));
+    for (int k = 0; k < 2000; ++k) {
+      const double tau_rad = marker.covered_rad() * (k + 0.5) / 2000;
+      largest = std::max(largest, predicted_sigma_centre_line_rad(marker, tau_rad, {}));
+    }
     EXPECT_NEAR(worst_sigma_centre_line_rad(marker, {}) / largest, 1, 0.01) << "design " << i;
   }
 }

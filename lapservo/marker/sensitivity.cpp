@@ -63,16 +63,17 @@ double predicted_sigma_surface_rad(const Marker& marker, double tau_rad, const V
   double tau_tau = 0, tau_rho = 0, rho_rho = 0;
   for (int i = 0; i < lines; ++i) {
     const double sine = reach * (2 * (i + 0.5) / lines - 1);
-    const double seam_px = std::abs(wrap_pi(tau_rad + std::asin(sine))) * radius_px * std::sqrt(1 - sine * sine);
+    const double seam_rad = distance_to_seam_rad(marker, tau_rad + std::asin(sine));
+    const double seam_px = seam_rad * radius_px * std::sqrt(1 - sine * sine);
     for (std::size_t k = 0; k < 4; ++k) {
-      if ((k == 1 || k == 2) && seam_px < seam_room_px) continue;
+      if (jumps_at_seam(marker, k) && seam_px < seam_room_px) continue;
       tau_tau += slopes[k] * slopes[k];
       tau_rho += slopes[k];
       rho_rho += 1;
     }
   }
   const double sigma_m = viewing.sigma_edge_px / viewing.px_per_m();
-  return sigma_m / std::sqrt(tau_tau - tau_rho * tau_rho / rho_rho);
+  return sigma_m / std::sqrt(std::max(0.0, tau_tau - tau_rho * tau_rho / std::max(1.0, rho_rho)));
 }
 
 }  // namespace lapservo

@@ -26,11 +26,12 @@ std::array<double, 4> tau_by_boundaries(const Marker& marker, double tau_rad);
 double predicted_print_error_rad(const Marker& marker, double tau_rad, double print_error_m);
 
 /// Standard deviation of tau from the centre line alone: four boundaries, their cross-ratio, eq. (18), to first order.
+/// In the gap, where there are none, that of a print that went on.
 double predicted_sigma_centre_line_rad(const Marker& marker, double tau_rad, const Viewing& viewing);
 
 /// Standard deviation of tau from all visible generatrices (a line per pixel over +-64 degrees) when the axis is known
-/// and the place along it is estimated too: the Cramer-Rao bound. Inner boundaries within 2.5 px of the seam do not
-/// count.
+/// and the place along it is estimated too: the Cramer-Rao bound. Within 2.5 px of the print's edges, boundaries that
+/// jump there do not count, and none does in the gap; infinite where too few are left.
 double predicted_sigma_surface_rad(const Marker& marker, double tau_rad, const Viewing& viewing);
 
 }  // namespace lapservo

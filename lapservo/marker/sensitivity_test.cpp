@@ -66,20 +66,22 @@ TEST(PredictedSigma, OfTheCentreLineIsThatOfWhatIsDecoded) {
 }
 
 // Sigma of tau where least squares fit it, and a shift along the axis, to all boundaries seen on lines one pixel apart,
-// from the lengths of the bands alone. An inner boundary whose place is within the seam's blur is left out.
+// from the lengths of the bands alone. A boundary whose place is within the blur of a seam at which it jumps is left
+// out.
 double fitted_sigma_rad(const Marker& marker, double tau_rad, const Viewing& viewing) {
   const double radius_px = marker.radius_m() * viewing.px_per_m(), reach_px = 0.9 * radius_px;
   double count = 0, sum = 0, squares = 0;
   for (double offset_px = -reach_px + 0.5; offset_px < reach_px; offset_px += 1) {
     const double line_tau_rad = wrap_two_pi(tau_rad + std::asin(offset_px / radius_px));
+    if (line_tau_rad > two_pi - marker.gap_rad) continue;
     // Foreshortened: the seam's distance in the image.
     const double cosine = std::sqrt(1 - offset_px * offset_px / (radius_px * radius_px));
-    const double seam_px = std::min(line_tau_rad, two_pi - line_tau_rad) * radius_px * cosine;
+    const double seam_px = std::min(line_tau_rad, two_pi - marker.gap_rad - line_tau_rad) * radius_px * cosine;
     const double step_rad = line_tau_rad < pi ? 1e-3 : -1e-3;
     const auto here = boundaries_m(marker, line_tau_rad), beside = boundaries_m(marker, line_tau_rad + step_rad);
     for (std::size_t k = 0; k < 4; ++k) {
-      const bool inner = k == 1 || k == 2;
-      if (inner && seam_px < 2.5) continue;
+      const bool jumps = k == 1 || k == 2 || marker.gap_rad > 0;
+      if (jumps && seam_px < 2.5) continue;
       const double slope_px = (beside[k] - here[k]) / step_rad * viewing.px_per_m();
       ++count, sum += slope_px, squares += slope_px * slope_px;
     }
@@ -89,7 +91,9 @@ double fitted_sigma_rad(const Marker& marker, double tau_rad, const Viewing& vie
 
 TEST(PredictedSigma, OfTheSurfaceIsThatOfItsLeastSquaresFit) {
   const Viewing viewing{1100, 0.11, 0.1};
-  for (const Marker& marker : {linear, non_linear})
+  Marker with_gap = linear;
+  with_gap.gap_rad = 0.5;
+  for (const Marker& marker : {linear, non_linear, with_gap})
     for (const double tau_rad : {0.0, 0.4, 3.0, 5.9})
       EXPECT_NEAR(fitted_sigma_rad(marker, tau_rad, viewing) / predicted_sigma_surface_rad(marker, tau_rad, viewing), 1,
                   0.02)

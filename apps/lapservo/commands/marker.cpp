@@ -193,9 +193,9 @@ int run_show(const RigOptions& options) {
   const Viewing viewing = options.viewing.viewing(rig.camera.fx_px);
   double surface_rad = 0, print_rad = 0;
   for (int i = 0; i < 16; ++i) {
-    const double tau_rad = two_pi * (i + 0.5) / 16;
-    surface_rad = std::max(surface_rad, predicted_sigma_surface_rad(instrument.marker, tau_rad, viewing));
-    print_rad = std::max(print_rad, predicted_print_error_rad(instrument.marker, tau_rad, usual_print_error_m));
+    const double part = (i + 0.5) / 16, printed_rad = part * instrument.marker.covered_rad();
+    surface_rad = std::max(surface_rad, predicted_sigma_surface_rad(instrument.marker, two_pi * part, viewing));
+    print_rad = std::max(print_rad, predicted_print_error_rad(instrument.marker, printed_rad, usual_print_error_m));
   }
   std::printf(
       "seen from %.0f mm with a focal length of %.0f px; worst sigma of psi by noise (%.2f px a boundary): %.2f mrad, "
