@@ -90,7 +90,7 @@ void SurfaceTracker::cover(Tracked& other, const ShaftPose& pose, WorkBudget& bu
 // there are any.
 bool SurfaceTracker::cover_expected(const Tracked& known, WorkBudget& budget) {
   for (Tracked& other : tracked_) {
-    if (&other == &known || !other.memory || !other.instrument.camera_from_rcm) continue;
+    if (&other == &known || !other.memory || !other.registration) continue;
     const ShaftPose pose =
         other.found.fit ? other.found.fit->unknowns.pose() : other.memory->expected_pose(now_s_).pose();
     if (may_meet(rig_.camera, known.instrument.marker, known.memory->expected_pose(now_s_).pose(),
@@ -103,9 +103,9 @@ bool SurfaceTracker::cover_expected(const Tracked& known, WorkBudget& budget) {
 // Those that were found, under or beside which the one that is looked for may be.
 void SurfaceTracker::cover_found(const Tracked& lost, const std::vector<Blob>& blobs, WorkBudget& budget) {
   others_.clear();
-  if (!lost.instrument.camera_from_rcm) return;
+  if (!lost.registration) return;
   for (Tracked& other : tracked_) {
-    if (&other == &lost || !other.found.fit || !other.instrument.camera_from_rcm) continue;
+    if (&other == &lost || !other.found.fit || !other.registration) continue;
     const ShaftPose& pose = other.found.fit->unknowns.pose();
     if (std::ranges::any_of(blobs, [&](const Blob& blob) {
           return lies_beside(rig_.camera, other.instrument.marker, pose, blob, lost.bands);

@@ -59,8 +59,8 @@ class Tracker {
   /// come, so this one is searched whole.
   std::vector<Observation> track(const cv::Mat& image_bgr) &&;
 
-  /// Another registration of an instrument that has one, from the next frame on, as of a camera that moves. The
-  /// frames before still count. Throws std::out_of_range for an instrument that the rig has not,
+  /// The registration of an instrument from the next frame on, as if the rig had it: of a camera that moves, for
+  /// example. The frames before still count. Throws std::out_of_range for an instrument that the rig has not,
   /// InputError for numbers that are not finite.
   void set_registration(std::size_t instrument, const Rigid3& camera_from_rcm,
                         const Eigen::Matrix<double, 6, 6>& covariance);

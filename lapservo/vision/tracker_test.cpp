@@ -1,6 +1,9 @@
 #include "lapservo/vision/tracker.h"
 
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -9,6 +12,8 @@
 
 #include "lapservo/core/angles.h"
 #include "lapservo/core/error.h"
+#include "lapservo/core/random.h"
+#include "lapservo/rig/registration_covariance.h"
 #include "lapservo/testing/scenes.h"
 
 namespace lapservo::internal {
@@ -90,6 +95,30 @@ TEST(Tracker, TakesAnotherRegistration) {
     EXPECT_EQ(got.features.r_px, expected.features.r_px);
   }
   EXPECT_THROW(Tracker(shot.rig).set_registration(1, {}, Eigen::Matrix<double, 6, 6>::Zero()), std::out_of_range);
+}
+
+// Also for which shaft may cover which, where the rig has none.
+TEST(Tracker, TakesTheFirstRegistration) {
+  const Rig rig = scenes::usual_rig(2);
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    Random random(seed);
+    const cv::Mat image = scenes::render(rig, scenes::crossing_pair(rig, random).q, seed);
+    Tracker tracker(scenes::without_rcm(rig), {.frame_budget = std::nullopt}),
+        known(rig, {.frame_budget = std::nullopt});
+    for (std::size_t i = 0; i < 2; ++i)
+      tracker.set_registration(i, *rig.instruments[i].camera_from_rcm, registration_covariance(rig.instruments[i]));
+    const auto& got = tracker.track(image);
+    const auto& expected = known.track(image);
+    for (std::size_t i = 0; i < 2; ++i) {
+      EXPECT_EQ(got[i].status, expected[i].status);
+      EXPECT_EQ(got[i].p_false, expected[i].p_false);
+      ASSERT_EQ(got[i].rcm.has_value(), expected[i].rcm.has_value());
+      if (got[i].rcm) {
+        EXPECT_EQ(got[i].rcm->q.vector(), expected[i].rcm->q.vector());
+      }
+    }
+  }
 }
 
 TEST(Tracker, RefusesOtherImagesThanTheRigs) {
