@@ -84,13 +84,8 @@ FrameTopics::FrameTopics(Transport& transport, const Rig& rig, const FrameNames&
                      instrument.tool ? transport.publisher<PoseMessage>(topics + "tip_cp") : nullptr,
                      transport.publisher<CylindersMessage>(topics + "markers")});
   }
-  tell_rcms();
-}
-
-// All of them: subscribers that come later get the last message only.
-void FrameTopics::tell_rcms() {
-  if (rcm_moves_) return;
-  StaticTransformsMessage message;
+  if (rcm_moves) return;
+  StaticTransformsMessage message;  // one: subscribers that come later get the last one only
   message.stamp_s = transport_.stamp_now_s();
   for (const Told& one : told_)
     if (one.instrument.camera_from_rcm)
@@ -101,26 +96,27 @@ void FrameTopics::tell_rcms() {
 void FrameTopics::publish(std::size_t index, const Observation& seen, const std::optional<Rigid3>& camera_from_rcm,
                           double stamp_s) {
   Told& told = told_.at(index);
-  if (camera_from_rcm && camera_from_rcm != told.instrument.camera_from_rcm) {
-    told.instrument.camera_from_rcm = camera_from_rcm;
-    tell_rcms();
-  }
+  TransformsMessage frames{stamp_s, {}};
+  if (camera_from_rcm) told.instrument.camera_from_rcm = camera_from_rcm;
+  if (camera_from_rcm && rcm_moves_) frames.transforms.push_back({told.names.camera, told.names.rcm, *camera_from_rcm});
   const bool has_q = seen.rcm && camera_from_rcm;
-  if (seen.status != Status::ok || (!has_q && !seen.marker)) return;
+  if (seen.status != Status::ok || (!has_q && !seen.marker)) {
+    if (!frames.transforms.empty()) moving_(frames);
+    return;
+  }
   PoseMessage pose = seen.marker ? pose_message(*seen.marker) : pose_message(told.instrument, *seen.rcm);
   pose.stamp_s = stamp_s;
   pose.frame = told.names.camera;
   told.pose(pose);
   const Rigid3 camera_from_marker =
       seen.marker ? seen.marker->camera_from_marker : camera_from_marker_at(told.instrument, seen.rcm->q);
-  TransformsMessage frames{stamp_s, {{told.names.camera, told.names.marker, camera_from_marker}}};
+  frames.transforms.push_back({told.names.camera, told.names.marker, camera_from_marker});
   std::optional<JointVector> q;
   if (has_q) {
     q = seen.rcm->q;
     Rigid3 rcm_from_shaft = rcm_from_unrolled(*q);
     rcm_from_shaft.rotation = rcm_from_shaft.rotation * Eigen::AngleAxisd(q->psi_rad, Eigen::Vector3d::UnitZ());
     rcm_from_shaft.translation.setZero();
-    if (rcm_moves_) frames.transforms.push_back({told.names.camera, told.names.rcm, *camera_from_rcm});
     frames.transforms.push_back({told.names.camera, told.names.shaft, *camera_from_rcm * rcm_from_shaft});
   }
   if (seen.tip && told.tip) {

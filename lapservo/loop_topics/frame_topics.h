@@ -16,18 +16,19 @@ struct FrameNames {
   std::string camera = camera_frame, rcm = "NAME_rcm", marker = "NAME_marker", shaft = "NAME_shaft", tip = "NAME_tip";
 };
 
-/// Where instruments are. At once and when it changes, /tf_static has the RCM frame in the camera frame; of every
-/// image, /tf has the marker frame and the shaft frame (origin at the RCM, turned by theta, phi and psi: z along the
-/// axis to the tip), /lapservo/NAME/pose the marker's with its covariance, /lapservo/NAME/markers its bands and the
-/// shaft from the RCM on as cylinders, and of a tool's tip the frame and /lapservo/NAME/tip_cp, its pose with
+/// Where instruments are. At once, /tf_static has the rig's RCM frames in the camera frame; of every image that shows
+/// the instrument, /tf has the marker frame and the shaft frame (origin at the RCM, turned by theta, phi and psi: z
+/// along the axis to the tip), /lapservo/NAME/pose the marker's with its covariance, /lapservo/NAME/markers its bands
+/// and the shaft from the RCM on as cylinders, and of a tool's tip the frame and /lapservo/NAME/tip_cp, its pose with
 /// covariance. Unknown ones are left out.
 class FrameTopics {
  public:
-  /// `rig`: all its instruments. `rcm_moves`: the RCM frame moves in the camera frame, and is in /tf of every image
-  /// instead. The transport must outlive it.
+  /// `rig`: all its instruments. `rcm_moves`: the RCM frame may move in the camera frame, and is in /tf of every image
+  /// of which it is known instead, as what /tf_static has said does not age. The transport must outlive it.
   FrameTopics(Transport& transport, const Rig& rig, const FrameNames& names, bool rcm_moves = false);
 
-  /// The rig's instrument `index` in an image of that stamp; `camera_from_rcm`: that which it was measured with.
+  /// The rig's instrument `index` in an image of that stamp; `camera_from_rcm`: that which it was measured with, the
+  /// rig's unless the RCM frame moves; nullopt where it is not known.
   void publish(std::size_t index, const Observation& seen, const std::optional<Rigid3>& camera_from_rcm,
                double stamp_s);
 
@@ -40,7 +41,6 @@ class FrameTopics {
     Transport::Publisher<PoseMessage> pose, tip;  ///< tip: null without a tool
     Transport::Publisher<CylindersMessage> markers;
   };
-  void tell_rcms();
 
   Transport& transport_;
   FrameNames names_;

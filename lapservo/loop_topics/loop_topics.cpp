@@ -107,12 +107,12 @@ TipGoal tip_goal_of(const PlaceMessage& message) {
 
 }  // namespace
 
-LoopTopics::LoopTopics(Transport& transport, const Rig& rig, const FrameNames& frames, bool rcm_moves, bool hears)
+LoopTopics::LoopTopics(Transport& transport, const Rig& rig, const FrameNames& frames, bool hears)
     : transport_(transport),
       rig_(rig),
       interrupted_s_(never),
       observation_(transport.publisher<ObservationMessage>(topic(rig, "observation"))),
-      frames_(transport, first_instrument(rig, "rig"), frames, rcm_moves),
+      frames_(transport, first_instrument(rig, "rig"), frames, true),
       desired_(transport.publisher<JointMessage>(topic(rig, "desired"))),
       error_(transport.publisher<JointMessage>(topic(rig, "error"))),
       diagnostics_(transport.publisher<DiagnosticMessage>("/diagnostics")),

@@ -38,7 +38,8 @@ struct LoopWishes {
 };
 
 /// The loop's topics for those who watch and command it, of the rig's first instrument NAME:
-/// /lapservo/NAME/observation (lapservo_msgs/Observation) and FrameTopics of every image; /lapservo/NAME/desired and
+/// /lapservo/NAME/observation (lapservo_msgs/Observation) and FrameTopics of every image, with an RCM frame that may
+/// move; /lapservo/NAME/desired and
 /// /lapservo/NAME/error (JointState: s_rad, r_px, l_px, d_px) every tick; /diagnostics (DiagnosticArray) once a second
 /// and when something changes; /lapservo/NAME/overlay/compressed, drawn in a thread of its own, at most ten a second.
 /// It hears /lapservo/NAME/command (StringStamped: start, start force; any other word stops), /lapservo/NAME/set_point
@@ -49,8 +50,8 @@ struct LoopWishes {
 /// with a remark, until 1.5 s after the first call of wishes(), nor where their sender was connected before.
 class LoopTopics {
  public:
-  /// `rcm_moves`: as in FrameTopics. `hears`: whether it hears anything; else it only publishes.
-  LoopTopics(Transport& transport, const Rig& rig, const FrameNames& frames, bool rcm_moves = false, bool hears = true);
+  /// `hears`: whether it hears anything; else it only publishes.
+  LoopTopics(Transport& transport, const Rig& rig, const FrameNames& frames, bool hears = true);
   ~LoopTopics();
 
   /// `state`: the loop's, in words; empty where it tracks.

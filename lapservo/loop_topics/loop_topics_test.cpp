@@ -38,7 +38,7 @@ ControlTick tick_of(const Rig& rig) {
 }
 
 struct Loop {
-  explicit Loop(bool hears = true) : topics(transport, rig, {}, false, hears) {}
+  explicit Loop(bool hears = true) : topics(transport, rig, {}, hears) {}
   template <class Message>
   std::vector<Message> sent(const std::string& topic) {
     return transport.sent<Message>("/lapservo/PSM1/" + topic);
@@ -99,6 +99,19 @@ TEST(LoopTopics, WhatIsNotKnownIsNotANumber) {
   const DiagnosticMessage diagnostic = loop.transport.sent<DiagnosticMessage>("/diagnostics").at(0);
   EXPECT_EQ(diagnostic.message, "hold: marker_lost");
   EXPECT_EQ(diagnostic.level, DiagnosticMessage::Level::warning);
+}
+
+// An endoscope that moved has its new place measured by the loop; until then its old one is not said any more.
+TEST(LoopTopics, TheRcmIsSaidWhileItIsKnown) {
+  Loop loop;
+  ControlTick tick = tick_of(loop.rig);
+  loop.topics.publish(tick, "");
+  tick.decision.registration = 1;
+  loop.topics.publish(tick, "hold: endoscope_moved");
+  EXPECT_TRUE(loop.transport.sent<StaticTransformsMessage>("/tf_static").empty());
+  const auto frames = loop.transport.sent<TransformsMessage>("/tf");
+  ASSERT_EQ(frames.size(), 1u);
+  EXPECT_EQ(frames[0].transforms.at(0).child, "PSM1_rcm");
 }
 
 TEST(LoopTopics, HearsCommandsAndDropsWhatMakesNoSense) {

@@ -191,7 +191,7 @@ int steer_arm(const ServoOptions& options) {
     arm.watch_operator([&] { return operator_presence->was_present(); });
   }
   // Before the arm is heard, so that another loop of this name is.
-  LoopTopics topics(transport, rig, frames, !options.endoscope.empty(), options.may_command("topics"));
+  LoopTopics topics(transport, rig, frames, options.may_command("topics"));
   std::optional<ArmPose> endoscope_arm;
   std::optional<HeldEndoscope> endoscope;
   if (!options.endoscope.empty()) {
