@@ -8,7 +8,8 @@
 namespace lapservo::internal {
 namespace {
 
-constexpr double memory_s = 0.1;
+// The latest image may be older than the others: the loop runs at 10 images a second, of which one may be missing.
+constexpr double memory_s = 0.1, latest_memory_s = 0.2;
 
 // Standard deviations: of a step at least (rad, rad, m, rad); of late stamps beside their scatter; of a delay that is a
 // guess, and of one that is known.
@@ -31,7 +32,10 @@ constexpr double beside = 0.02, beside_of_path = 0.005, beside_usual = 2;
 bool OffsetSteps::add(const SeenOffset& offset, bool delay_is_known) {
   Seen now{offset};
   if (!seen_.empty()) now.path = seen_.back().path + (offset.measured - seen_.back().at.measured).cwiseAbs();
-  while (!seen_.empty() && !(offset.stamp_s - seen_.front().at.stamp_s < memory_s)) seen_.pop_front();
+  const auto is_compared = [&] {
+    return offset.stamp_s - seen_.front().at.stamp_s < (seen_.size() > 1 ? memory_s : latest_memory_s);
+  };
+  while (!seen_.empty() && !is_compared()) seen_.pop_front();
   // A stamp that is missing or not newer carries no information.
   if (!seen_.empty() && !(offset.stamp_s > seen_.back().at.stamp_s)) return false;
   if (!latest_.empty() && !(offset.stamp_s > latest_.back().stamp_s)) latest_.clear();

@@ -23,8 +23,9 @@ struct SeenOffset {
 /// learnt at once.
 class OffsetSteps {
  public:
-  /// Whether it lies elsewhere than a moment ago. Images that do are compared with those before them until these are
-  /// 0.1 s old; then it has to go on moving.
+  /// Whether it lies elsewhere than a moment ago: than in the images of the last 0.1 s, and in the one before where
+  /// that is not 0.2 s old. Images that do are compared with those before them until these are as old; then it has to
+  /// go on moving.
   bool add(const SeenOffset& now, bool delay_is_known);
   /// The next image is unrelated to the previous ones.
   void interrupt() { seen_.clear(); }
@@ -49,7 +50,7 @@ class OffsetSteps {
   void learn(const Change& change, bool delay_is_known);
   const Seen& oldest() const;
 
-  std::deque<Seen> seen_;                                 ///< in order of time, of the last 0.1 s
+  std::deque<Seen> seen_;                                 ///< in order of time, those to compare with
   std::deque<Change> latest_;                             ///< not learnt yet
   Eigen::Array4d step_squared_ = Eigen::Array4d::Zero();  ///< the usual one
   double late_s2_ = 0;

@@ -10,19 +10,20 @@
 
 namespace lapservo::internal::offset_steps_test {
 
-constexpr double period_s = 1 / 60.0;
+constexpr double period_s = 1 / 60.0, slow_period_s = 0.1;  // of most tests; the longest that the loop runs at
 
 // Joints that swing, images whose stamps are off by up to `jitter_s`, and an offset that the caller adds to.
 class Swing {
  public:
-  explicit Swing(std::uint64_t seed, double jitter_s = 0.001) : random_(seed), jitter_s_(jitter_s) {}
+  explicit Swing(std::uint64_t seed, double jitter_s = 0.001, double every_s = period_s)
+      : random_(seed), jitter_s_(jitter_s), every_s_(every_s) {}
 
   SeenOffset next(const Eigen::Vector3d& offset = Eigen::Vector3d::Zero(), double late_s = 0) {
-    const double t = period_s * count_++;
+    const double t = every_s_ * count_++;
     const Eigen::Vector3d shown = at(t + late_s + random_.uniform(-jitter_s_, jitter_s_));
     const Eigen::Vector3d noise(3e-5 * random_.normal(), 3e-5 * random_.normal(), 3e-6 * random_.normal());
     SeenOffset seen{t};
-    seen.measured.head<3>() = at(t), seen.rate_per_s.head<3>() = (at(t) - at(t - period_s)) / period_s;
+    seen.measured.head<3>() = at(t), seen.rate_per_s.head<3>() = (at(t) - at(t - every_s_)) / every_s_;
     seen.offset.head<3>() = shown - at(t) + noise + offset;
     return seen;
   }
@@ -32,13 +33,16 @@ class Swing {
     return {0.3 * std::sin(1.3 * t), 0.2 * std::sin(0.9 * t + 1), 0.01 * std::sin(1.1 * t + 2)};
   }
   Random random_;
-  double jitter_s_;
+  double jitter_s_, every_s_;
   int count_ = 0;
 };
 
 // After 150 images in which the offset stood.
 struct Watched {
-  explicit Watched(std::uint64_t seed) : swing(seed) { expect_silent(150); }
+  explicit Watched(std::uint64_t seed, double image_every_s = period_s)
+      : every_s(image_every_s), swing(seed, 0.001, every_s) {
+    expect_silent(150);
+  }
 
   bool add(const Eigen::Vector3d& offset) { return steps.add(swing.next(offset), true); }
   void expect_silent(int images, const Eigen::Vector3d& offset = Eigen::Vector3d::Zero()) {
@@ -47,32 +51,36 @@ struct Watched {
   // The motion of the offset from rest, on a smooth way that takes `duration_s`, when the first image is reported.
   double told_after_mrad(double duration_s) {
     const Eigen::Vector3d way(0.3, -0.2, 0.015);
-    for (int i = 0; i * period_s < duration_s; ++i) {
-      const Eigen::Vector3d moved = MinimumJerk::position(i * period_s / duration_s) * way;
+    for (int i = 0; i * every_s < duration_s; ++i) {
+      const Eigen::Vector3d moved = MinimumJerk::position(i * every_s / duration_s) * way;
       if (add(moved)) return 1e3 * moved[0];
     }
     return 1e3 * way[0];
   }
 
+  double every_s;
   Swing swing;
   OffsetSteps steps;
 };
 
 TEST(OffsetSteps, IsSilentWhileTheJointsSwing) {
-  for (const double jitter_s : {0.0, 0.001, 0.004})
-    for (std::uint64_t seed = 1; seed <= 5; ++seed) {
-      Swing swing(seed, jitter_s);
-      OffsetSteps steps;
-      for (int i = 0; i < 600; ++i)
-        EXPECT_EQ(steps.add(swing.next(), i > 60) && i > 20, false) << jitter_s << " " << seed << " " << i;
-    }
+  for (const double every_s : {period_s, slow_period_s})
+    for (const double jitter_s : {0.0, 0.001, 0.004})
+      for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+        Swing swing(seed, jitter_s, every_s);
+        OffsetSteps steps;
+        for (int i = 0; i < 600; ++i)
+          EXPECT_EQ(steps.add(swing.next(), i > 60) && i > 20, false) << jitter_s << " " << seed << " " << i;
+      }
 }
 
 // Its speed grows little from image to image: what it gained is not usual.
 TEST(OffsetSteps, TellsAnOffsetThatGainsSpeedByAndBy) {
-  for (const double duration_s : {0.6, 1.0, 2.0, 4.0})
-    for (std::uint64_t seed = 1; seed <= 5; ++seed)
-      EXPECT_LT(Watched(seed).told_after_mrad(duration_s), 20) << duration_s << " " << seed;
+  for (const double every_s : {period_s, slow_period_s})
+    for (const double duration_s : {0.6, 1.0, 2.0, 4.0})
+      for (std::uint64_t seed = 1; seed <= 5; ++seed)
+        EXPECT_LT(Watched(seed, every_s).told_after_mrad(duration_s), 20)
+            << every_s << " " << duration_s << " " << seed;
 }
 
 // Nor is it when it is over and all begins anew.
