@@ -37,10 +37,16 @@ BagKind kind_of(const std::string& path) {
   return fs::is_regular_file(path, error) ? kind_of_file(path) : BagKind::none;
 }
 
+#ifndef LAPSERVO_BAGS
+bool is_session(const std::string&) {
+  return false;
+}
+#endif
+
 }  // namespace
 
 bool is_bag(const std::string& path) {
-  return kind_of(path) != BagKind::none;
+  return !is_session(path) && kind_of(path) != BagKind::none;
 }
 
 std::string bag_of(const std::string& input) {

@@ -7,7 +7,8 @@
 
 namespace lapservo::internal {
 
-/// Whether a file or folder is a bag by what it begins with, or means to be one by its name.
+/// Whether a file or folder is a bag by what it begins with, or means to be one by its name. A session of dvrk_data
+/// (session.h) is none, also where its bag's files lie in its own folder.
 bool is_bag(const std::string& path);
 
 /// The input itself where it is a bag, else the bag of a session of dvrk_data (session.h); empty for others.

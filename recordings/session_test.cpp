@@ -132,6 +132,10 @@ TEST(Session, HasTheBagThatItsIndexNames) {
   folder.finish(R"(, "rosbags": "rosbag2")");
   EXPECT_EQ(bag_of(folder.path().string()), (folder.path() / "rosbag2").string());
   EXPECT_EQ(bag_of((folder.path() / "stereo.mp4").string()), "");
+  testing::write_file(folder.path() / "joints_0.mcap", "\x89MCAP");
+  folder.finish(R"(, "rosbags": "joints_0.mcap")");
+  EXPECT_FALSE(is_bag(folder.path().string()));
+  EXPECT_EQ(bag_of(folder.path().string()), (folder.path() / "joints_0.mcap").string());
 }
 
 TEST(Session, ThatIsDamagedIsReadOrRefused) {
