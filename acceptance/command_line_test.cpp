@@ -338,6 +338,22 @@ TEST_F(CommandLine, AVideoThatNamesItsTransferIsReadByItUnlessTheRigSaysAnother)
                  {video, "is read as sRGB", "expected srgb"});
   expect_failed("track " + video + " --rig configs/example.yaml --out out/obs.csv",
                 {video + ": names HLG: its light is read as sRGB"});
+  expect_failed("track " + video + " --fps 8 --rig configs/example.yaml --out out/obs.csv",
+                {video + ": --fps 8 is ignored: it is for folders of images"});
+}
+
+TEST_F(CommandLine, OptionsThatTheInputLeavesWithoutAnEffectAreNamed) {
+  write_grey("in/grey.png");
+  const std::string rig = " --rig configs/example.yaml --out out/obs.csv";
+  expect_refused("track in/grey.png --joint-topic /x" + rig, {"--joint-topic: is /x, which is for bags"});
+  expect_refused("track in/grey.png --joints ros2:/PSM1/measured_js --joint-topic /x" + rig,
+                 {"--joint-topic: is /x, which is for bags"});
+  for (const char* idle : {"--fps 8", "--colour-matrix bt601", "--eye left"})
+    expect_refused("track ros2:/image " + std::string(idle) + rig, {"is of recordings, expected none with a topic"});
+  expect_refused("calibrate marker in/grey.png --rig configs/example.yaml --out out/rig.yaml --joint-topic /x",
+                 {"--joint-topic", "expected --joints with it"});
+  expect_failed("track in/grey.png --chroma-location left" + rig,
+                {"in/grey.png: --colour-matrix and --chroma-location are ignored: they are for videos in YCbCr"});
 }
 
 TEST_F(CommandLine, AVideoThatEndsEarlyIsMeasuredAndSaysSo) {

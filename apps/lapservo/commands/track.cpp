@@ -258,8 +258,6 @@ void say_moved(const TrackOptions& options, const Frame& frame) {
 std::unique_ptr<LiveFrames> open_topic(const TrackOptions& options, const RigByFrame& rigs) {
   if (!rigs.camera() && (names_topic(options.input) || options.input.starts_with("gst:")))
     throw InputError("--rig", "is missing, expected a rig's YAML: live images have none beside them");
-  if (names_topic(options.input) && !(options.eye + options.side_by_side + options.image_topic).empty())
-    throw InputError("--eye, --side-by-side, --image-topic", "are of recordings, expected none with a topic");
   return names_topic(options.input) ? std::make_unique<LiveFrames>(options.input, *rigs.camera()) : nullptr;
 }
 
@@ -461,8 +459,18 @@ class TrackRun {
   bool stopped_ = false, read_to_the_end_ = false, lossy_ = false;
 };
 
-int run(const TrackOptions& options) {
+// Options that would be ignored.
+void refuse_idle(const TrackOptions& options, const Command& command) {
+  refuse_idle_joint_topic(options.input, options.joints, options.joint_topic);
+  if (!names_topic(options.input)) return;
+  std::vector<std::string> of_recordings = frame_option_names();
+  std::erase(of_recordings, "--deinterlace");
+  command.refuse(of_recordings, "is of recordings, expected none with a topic");
+}
+
+int run(const TrackOptions& options, const Command& command) {
   options.web.check();
+  refuse_idle(options, command);
   refuse_outputs(options, inputs_of(options));
   return TrackRun(options).run();
 }
@@ -487,7 +495,7 @@ void add_input_options(Command command, TrackOptions& options) {
   command.add_flag("--deinterlace", options.deinterlace,
                    "For interlaced video (status: interlaced): track the field of the even rows; the same as "
                    "deinterlace: true in the rig's camera");
-  command.add_option("--fps", options.fps, between(0.001, 100000.0), "Frames per second of a folder's images");
+  command.add_option("--fps", options.fps, between(0.001, 100000.0), "Frames per second of a folder's images; else 30");
 }
 
 }  // namespace

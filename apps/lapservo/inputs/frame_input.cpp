@@ -8,12 +8,15 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/format.h>
+
 #include "apps/lapservo/cli/interrupt.h"
 #include "cameras/camera.h"
 #include "lapservo/calibration/recording/frame_recording.h"
 #include "lapservo/core/error.h"
 #include "lapservo/io/frame_filter.h"
 #include "lapservo/io/video/read_ahead.h"
+#include "lapservo/io/video/video_reader.h"
 #include "recordings/bag_frames.h"
 #include "recordings/open_bag.h"
 #include "recordings/session.h"
@@ -64,6 +67,14 @@ std::unique_ptr<FrameSource> of_one_eye(std::unique_ptr<FrameSource> frames, con
   return std::make_unique<HalfFrames>(std::move(frames), is_first, input);
 }
 
+// Says which options an input leaves without an effect. `has_chroma`: whether it may be a video in YCbCr.
+void say_ignored(const std::string& input, const FrameOptions& options, FrameSource::Kind kind, bool has_chroma) {
+  if (options.fps && kind != FrameSource::Kind::folder && kind != FrameSource::Kind::image)
+    say_remark(input, fmt::format("--fps {} is ignored: it is for folders of images", *options.fps));
+  if (!has_chroma && !(options.colour_matrix + options.chroma_location).empty())
+    say_remark(input, ignored_colours_text);
+}
+
 // With the layout of both eyes, where the input says it.
 std::pair<std::unique_ptr<FrameSource>, std::string> open_whole(const std::string& input, const FrameOptions& options,
                                                                 const Camera* camera) {
@@ -72,18 +83,24 @@ std::pair<std::unique_ptr<FrameSource>, std::string> open_whole(const std::strin
   if (is_bag(input)) {
     auto frames = std::make_unique<BagFrames>(open_bag(input), options.image_topic);
     say_if_undistorted(frames->topic(), camera);
+    say_ignored(input, options, frames->kind(), false);
     return {std::move(frames), std::string()};
   }
 #ifdef LAPSERVO_BAGS
   if (is_session(input)) {
     auto [frames, layout] = open_session(input, options.image_topic, reading);
+    say_ignored(input, options, frames->kind(), true);
     return {std::move(frames), std::move(layout)};
   }
 #endif
   refuse_topic_outside_bags("--image-topic", options.image_topic, input);
   const int eyes = options.eye.empty() ? 1 : 2;
   const cv::Size size = camera ? cv::Size(eyes * camera->width_px, camera->height_px) : cv::Size();
-  return {open_camera_or_file(input, options.fps, size, interrupted, reading), std::string()};
+  auto frames = open_camera_or_file(input, options.fps.value_or(FrameOptions::usual_fps), size, interrupted, reading);
+  const FrameSource::Kind kind = frames->kind();
+  const bool is_video = kind == FrameSource::Kind::video || (kind == FrameSource::Kind::live && !names_camera(input));
+  say_ignored(input, options, kind, is_video);
+  return {std::move(frames), std::string()};
 }
 
 }  // namespace

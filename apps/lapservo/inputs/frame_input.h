@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,14 +16,15 @@ struct FrameOptions {
   std::string image_topic;   ///< of a bag: see internal::image_topic_of(); of a session: the stream
   std::string eye;           ///< left or right, where both are side by side in each frame; else empty
   std::string side_by_side;  ///< LR or RL; empty: as a session says, else LR
-  double fps = 30;           ///< of a folder of images
-  bool deinterlace = false;  ///< one field of each frame is tracked; also where the rig's camera says so
+  static constexpr double usual_fps = 30;
+  std::optional<double> fps;  ///< of a folder of images; else usual_fps
+  bool deinterlace = false;   ///< one field of each frame is tracked; also where the rig's camera says so
   std::string colour_matrix, chroma_location;  ///< see VideoReading
 };
 
 /// internal::open_camera_or_file() until Ctrl-C, and the images of bags and of sessions of dvrk_data, of one eye where
-/// the options name it. Says the source's remark on stderr. `camera`:
-/// the rig's, whose size a camera's images shall have; null where none is known.
+/// the options name it. Says the source's remark on stderr, and which options it ignores. `camera`: the rig's, whose
+/// size a camera's images shall have; null where none is known.
 std::unique_ptr<FrameSource> open_frames(const std::string& input, const FrameOptions& options, const Camera* camera);
 
 /// Says it on stderr, once, where there is something to say.
@@ -43,7 +45,7 @@ void add_eye_options(Command command, FrameOptions& options);
 /// Those, --colour-matrix and --chroma-location.
 void add_video_options(Command command, FrameOptions& options);
 
-/// All that say how a recording's frames are read, but for --deinterlace.
+/// All that say how a recording's frames are read.
 std::vector<std::string> frame_option_names();
 
 }  // namespace lapservo::app

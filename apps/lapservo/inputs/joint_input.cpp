@@ -33,7 +33,6 @@ JointInput reported(JointInput input) {
 }
 
 JointInput read_table(const CalibrateOptions& options, const Instrument& instrument) {
-  refuse_topic_outside_bags("--joint-topic", options.joint_topic, options.joints);
   const Joints joints =
       joints_of(instrument, instrument.joints ? std::vector<std::string>() : columns_of(options.joints), options.joints,
                 options.rig);
@@ -137,15 +136,18 @@ void add_joint_topic_option(Command command, std::string& joint_topic) {
                      "or the only measured_js");
 }
 
+void refuse_idle_joint_topic(const std::string& input, const std::string& joints, const std::string& joint_topic) {
+  const std::string& source = joints.empty() ? input : joints;
+  if (bag_of(source).empty()) refuse_topic_outside_bags("--joint-topic", joint_topic, source);
+}
+
 std::optional<JointInput> find_joint_input(const CalibrateOptions& options, const Instrument& instrument,
                                            const FrameSource* frames) {
+  refuse_idle_joint_topic(options.input, options.joints, options.joint_topic);
   const bool are_named = !options.joints.empty();
   const std::string path = bag_of(are_named ? options.joints : options.input);
   if (path.empty() && are_named) return read_table(options, instrument);
-  if (path.empty()) {
-    refuse_topic_outside_bags("--joint-topic", options.joint_topic, options.input);
-    return std::nullopt;
-  }
+  if (path.empty()) return std::nullopt;
   const auto bag = open_bag(path);
   if (path != options.input) say_remark(path, bag->remark());
   const BagTopic* topic = joint_topic_of(*bag, options.joint_topic, instrument.name);

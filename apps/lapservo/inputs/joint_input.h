@@ -13,10 +13,13 @@ namespace lapservo::app {
 void add_joint_options(Command command, CalibrateOptions& options, const std::string& help);
 void add_joint_topic_option(Command command, std::string& joint_topic);
 
+/// Throws InputError for a --joint-topic where neither `joints`, of --joints, nor without it the input is a bag.
+void refuse_idle_joint_topic(const std::string& input, const std::string& joints, const std::string& joint_topic);
+
 /// Joints of --joints, a CSV or a bag; without --joints of the input itself where it is a bag that has them, else
 /// nullopt. Reads the instrument's joints; where it has none, the recording's own four in the order theta, phi, rho,
 /// psi. A bag's stamps go with those of `frames`; where these have none, or there is nullptr, its times begin with its
-/// joints. Throws InputError for other files.
+/// joints. Throws InputError for other files, and as refuse_idle_joint_topic().
 std::optional<internal::JointInput> find_joint_input(const CalibrateOptions& options, const Instrument& instrument,
                                                      const FrameSource* frames);
 

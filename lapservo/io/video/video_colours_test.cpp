@@ -7,6 +7,7 @@
 #include <opencv2/core.hpp>
 
 #include "lapservo/io/frame_source.h"
+#include "lapservo/io/video/video_reader.h"
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
 #include "lapservo/testing/videos.h"
@@ -78,6 +79,13 @@ TEST(VideoWithoutTags, IsReadByItsHeightOrItsWriterOrAsGiven) {
     const auto frame = source->next();
     ASSERT_TRUE(frame);
     expect_patches(frame->bgr, patches, 3);
+  }
+  for (const char* format : {"bgr0", "gray", "yuv444p"}) {
+    const std::string path = (folder / (std::string(format) + ".mkv")).string();
+    if (!testing::write_by_ffmpeg(path, patches_of(patches, 480), std::string("-c:v ffv1 -pix_fmt ") + format))
+      GTEST_SKIP() << "FFmpeg here can't write " << format;
+    const auto source = open_frame_source(path, 25, {.chroma_location = "left"});
+    EXPECT_EQ(source->remark(), std::string(format) == "yuv444p" ? "" : internal::ignored_colours_text) << format;
   }
   EXPECT_EQ(testing::input_error([&] { open_frame_source((folder / "a.mp4").string(), 25, {.colour_matrix = "709"}); }),
             "colour matrix: is 709, expected bt601, bt709 or bt2020");

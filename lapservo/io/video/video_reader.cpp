@@ -292,6 +292,7 @@ class Video : public FrameSource {
     std::vector<std::string> remarks;
     if (colours.transfer) remarks.push_back(remark_on_transfer(*colours.transfer));
     if (!given_.matrix) remarks.push_back(remark_on_matrix(*frame_, of_software_));
+    remarks.push_back(remark_on_given(*frame_, given_));
     if (has_assumed_rate())
       remarks.push_back(
           fmt::format("names no times and no rate: read as {:.6g} frames/s (ffmpeg -framerate RATE -i IN -c copy "

@@ -8,6 +8,10 @@
 
 namespace lapservo::internal {
 
+/// Said where a colour matrix or a place of chroma is given for a source that has no use for it.
+inline constexpr auto ignored_colours_text =
+    "--colour-matrix and --chroma-location are ignored: they are for videos in YCbCr";
+
 /// The frames of a video file or, live, of a stream (rtsp://...), by FFmpeg's libraries: OpenCV hides what their
 /// decoders complain of. Damaged are those that the decoder complained of, or that were predicted from such a one; in
 /// place of a frame that can't be decoded at all comes the one before (or black). Times are those of the container's

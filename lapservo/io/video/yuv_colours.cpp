@@ -13,6 +13,7 @@ extern "C" {
 
 #include "lapservo/core/error.h"
 #include "lapservo/io/video/bgr_converter.h"
+#include "lapservo/io/video/video_reader.h"
 
 namespace lapservo::internal {
 namespace {
@@ -32,6 +33,11 @@ bool names_no_matrix(const AVFrame& frame) {
 bool is_rgb(const AVFrame& frame) {
   const AVPixFmtDescriptor* const format = av_pix_fmt_desc_get(pixel_format_of(frame));
   return format && (format->flags & AV_PIX_FMT_FLAG_RGB) != 0;
+}
+
+bool has_chroma(const AVFrame& frame) {
+  const AVPixFmtDescriptor* const format = av_pix_fmt_desc_get(pixel_format_of(frame));
+  return format && !is_rgb(frame) && format->nb_components >= 3;
 }
 
 ChromaSite usual_site(AVCodecID codec, AVColorSpace matrix) {
@@ -120,9 +126,7 @@ std::optional<YuvColours> yuv_colours_of(const AVFrame& frame, AVCodecID codec, 
 }
 
 std::string remark_on_matrix(const AVFrame& frame, bool of_software) {
-  const AVPixFmtDescriptor* const format = av_pix_fmt_desc_get(pixel_format_of(frame));
-  const bool has_chroma = format && !is_rgb(frame) && format->nb_components >= 3;
-  if (!has_chroma || !names_no_matrix(frame) || usual_matrix(frame.height) == YuvMatrix::bt601) return "";
+  if (!has_chroma(frame) || !names_no_matrix(frame) || usual_matrix(frame.height) == YuvMatrix::bt601) return "";
   if (of_software)
     return "names no colour matrix: read as Rec. 601 with chroma amid the pixels, as OpenCV and ffmpeg write RGB; if "
            "ffmpeg wrote a camera's video anew: --colour-matrix bt709 --chroma-location left";
@@ -130,6 +134,10 @@ std::string remark_on_matrix(const AVFrame& frame, bool of_software) {
       "names no colour matrix: read as Rec. 709, as it is {} rows high; if OpenCV or ffmpeg wrote it from RGB: "
       "--colour-matrix bt601 --chroma-location centre",
       frame.height);
+}
+
+std::string remark_on_given(const AVFrame& frame, const GivenColours& given) {
+  return (given.matrix || given.chroma) && !has_chroma(frame) ? ignored_colours_text : "";
 }
 
 }  // namespace lapservo::internal

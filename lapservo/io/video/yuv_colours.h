@@ -44,4 +44,7 @@ std::string expected_transfer(const AVFrame& frame);
 /// written it; else empty.
 std::string remark_on_matrix(const AVFrame& frame, bool of_software);
 
+/// Where something is given and the frame, of RGB or grey, has no use for it: that, in words; else empty.
+std::string remark_on_given(const AVFrame& frame, const GivenColours& given);
+
 }  // namespace lapservo::internal

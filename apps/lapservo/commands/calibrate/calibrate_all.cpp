@@ -179,7 +179,7 @@ class Guide {
       if (!value.empty()) all.insert(all.end(), {option, value});
     if (!camera && !options_.instrument.empty()) all.insert(all.end(), {"--instrument", options_.instrument});
     if (options_.deinterlace) all.push_back("--deinterlace");
-    if (!camera) all.insert(all.end(), {"--fps", fmt::format("{}", options_.fps)});
+    if (!camera) all.insert(all.end(), {"--fps", fmt::format("{}", options_.fps.value_or(options_.usual_fps))});
     return all;
   }
 
@@ -361,7 +361,7 @@ void add_calibrate_all(Command parent) {
   add_joint_topic_option(command, options.joint_topic);
   add_video_options(command, options);
   command.add_flag("--deinterlace", options.deinterlace, "For interlaced video: measure the field of the even rows");
-  command.add_option("--fps", options.fps, between(0.001, 1000.0), "Frames per second of folders of images");
+  command.add_option("--fps", options.fps, between(0.001, 1000.0), "Frames per second of folders of images; else 30");
   command.add_option("--redo", options.redo, one_of({"camera", "colour", "marker", "registration", "check"}),
                      "A step that is done again though it was done, with those after it");
   command.add_flag("--no-questions", options.no_questions, "Leave out what no option names; a terminal prompts for it");

@@ -44,7 +44,7 @@ void add_recording_options(Command command, CalibrateOptions& options) {
   command.add_flag("--deinterlace", options.deinterlace, "For interlaced video: measure the field of the even rows");
   add_image_topic_option(command, options.image_topic);
   add_video_options(command, options);
-  command.add_option("--fps", options.fps, between(0.001, 1000.0), "Frames per second of a folder of images");
+  command.add_option("--fps", options.fps, between(0.001, 1000.0), "Frames per second of a folder of images; else 30");
 }
 
 std::size_t instrument_meant(const Rig& rig, const std::string& name, const std::string& rig_file) {

@@ -85,9 +85,13 @@ int calibrate_marker(const CalibrateOptions& options) {
 }
 
 void add_calibrate_marker(Command parent) {
+  const auto job = [](const CalibrateOptions& options, const Command& command) {
+    if (options.joints.empty())
+      command.refuse({"--joint-topic"}, "is of the bag of --joints, expected --joints with it");
+    return calibrate_marker(options);
+  };
   auto [command, options] = parent.add_subcommand<CalibrateOptions>(
-      "marker", "Measure a mounted marker's print: band lengths, a wrap that is not square, the gap at the seam.",
-      calibrate_marker);
+      "marker", "Measure a mounted marker's print: band lengths, a wrap that is not square, the gap at the seam.", job);
   command.add_option(
       "input", options.input, required(),
       "Images of a slow full turn about the shaft's axis: a folder, a video, a bag, a camera or a stream");
