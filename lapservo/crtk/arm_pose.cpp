@@ -12,6 +12,15 @@ namespace {
 
 constexpr double late_s = 0.07, memory_s = 3, by_motion_of_s = 0.05, ahead_s = 0.1;
 
+// The camera's by dVRK's trajectories of an ECM, 30 degrees/s about each of three axes and 60 mm/s along the shaft,
+// 0.25 m from the RCM; and the change at once, by stamps that are some milliseconds off.
+constexpr double way_m_s = 0.25, turn_rad_s = 0.9, way_at_once_m = 2e-3, turn_at_once_rad = 1e-2;
+
+// `way` along each axis, then `turn` about it.
+Eigen::Vector<double, 6> of_axes(double way, double turn) {
+  return (Eigen::Vector<double, 6>() << way, way, way, turn, turn, turn).finished();
+}
+
 // From one pose on to another by that share of the way, which may be above 1.
 Rigid3 between(const Rigid3& from, const Rigid3& to, double share) {
   const Eigen::Vector3d turn = rotation_vector_of(to.rotation * from.rotation.conjugate());
@@ -39,12 +48,31 @@ void ArmPose::take(const PlaceMessage& message, bool local) {
   local_ = local;
   if (other_topic) sender_ = {};
   const FirstSender::Verdict verdict = sender_.hear(message.source, arrival_s);
-  if (other_topic || verdict == FirstSender::Verdict::counts_anew) stamps_ = StampClock(late_s), poses_.clear();
-  if (sender_.has_rival(arrival_s)) return poses_.clear();
+  if (other_topic || verdict == FirstSender::Verdict::counts_anew) stamps_ = StampClock(late_s), forget();
+  if (sender_.has_rival(arrival_s)) return forget();
   const StampClock::Reading reading = stamps_.read(message.stamp_s, arrival_s);
   if (reading.verdict != StampVerdict::fresh || (!poses_.empty() && reading.time_s <= poses_.back().time_s)) return;
-  poses_.push_back({reading.time_s, {rotation.normalized(), translation}});
+  const Pose now{reading.time_s, {rotation.normalized(), translation}};
+  const WildPoses::Verdict seems = validate(now);
+  if (seems == WildPoses::Verdict::wild) return;
+  if (seems == WildPoses::Verdict::jumped) poses_.clear();
+  poses_.push_back(now);
   while (poses_.back().time_s - poses_.front().time_s > memory_s) poses_.pop_front();
+}
+
+void ArmPose::forget() {
+  poses_.clear();
+  wild_.reset();
+}
+
+ArmPose::WildPoses::Verdict ArmPose::validate(const Pose& now) {
+  if (!wild_) {
+    wild_.emplace(of_axes(way_m_s, turn_rad_s), of_axes(way_at_once_m, turn_at_once_rad));
+    first_rotation_ = now.pose.rotation;
+  }
+  Eigen::Vector<double, 6> reading;
+  reading << now.pose.translation, rotation_vector_of(now.pose.rotation * first_rotation_.conjugate());
+  return wild_->validate(now.time_s, reading);
 }
 
 bool ArmPose::has_two_senders() const {

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "lapservo/control/wild_readings.h"
 #include "lapservo/crtk/first_sender.h"
 #include "lapservo/crtk/stamp_clock.h"
 #include "lapservo/crtk/transport.h"
@@ -17,7 +18,8 @@ namespace lapservo::internal {
 
 /// The pose that a CRTK arm reports: local/measured_cp, or measured_cp of an arm of which no other came within
 /// FirstSender::silence_s after it; from then on the topic stays, as the other's base may be another one. Poses that
-/// are not finite, or whose rotation is none, do not count; while two programs publish, nobody's do.
+/// are not finite, or whose rotation is none, do not count, nor do those that no ECM can have reached since the last
+/// one (WildReadings); while two programs publish, nobody's do.
 class ArmPose {
  public:
   /// `arm`: as in CrtkRobot. The transport and the clock must outlive it.
@@ -35,12 +37,17 @@ class ArmPose {
     double time_s = 0;
     Rigid3 pose;
   };
+  using WildPoses = WildReadings<6>;
   void take(const PlaceMessage& message, bool local);
+  void forget();
+  WildPoses::Verdict validate(const Pose& now);
 
   const Clock& clock_;
   mutable std::mutex mutex_;
   StampClock stamps_;
   std::deque<Pose> poses_;
+  std::optional<WildPoses> wild_;                                       // since all before was forgotten
+  Eigen::Quaterniond first_rotation_ = Eigen::Quaterniond::Identity();  // of then
   bool local_ = false;
   double first_s_ = std::numeric_limits<double>::infinity();  // when a pose came
   FirstSender sender_;
