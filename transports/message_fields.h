@@ -10,6 +10,7 @@
 #include <span>
 #include <string>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "lapservo/crtk/messages.h"
@@ -75,15 +76,16 @@ class MessageBytes {
     std::vector<T> numbers;
     (*this)(numbers);
   }
-  /// The stamp of a std_msgs/Header; NaN where it is none.
-  double stamp_s() {
+  /// A std_msgs/Header: its stamp, NaN where it is none, and its frame where the message has one.
+  void header(auto& message) {
     if (!is_cdr_) number<std::uint32_t>();  // seq
     const double sec =
         is_cdr_ ? static_cast<double>(number<std::int32_t>()) : static_cast<double>(number<std::uint32_t>());
     const auto nanosec = number<std::uint32_t>();
     std::string frame_id;
     (*this)(frame_id);
-    return nanosec < 1000000000u ? sec + 1e-9 * nanosec : std::numeric_limits<double>::quiet_NaN();
+    message.stamp_s = nanosec < 1000000000u ? sec + 1e-9 * nanosec : std::numeric_limits<double>::quiet_NaN();
+    if constexpr (requires { message.frame; }) message.frame = std::move(frame_id);
   }
   bool is_whole() const { return is_whole_; }
   /// Whether nothing is left over. Some writers of CDR fill up to a multiple of four or eight bytes.

@@ -37,7 +37,7 @@ void fields(auto& each, auto& wire, Is<JointMessage> auto& message) {
 }
 
 void fields(auto& each, auto& wire, Is<TrajectoryMessage> auto& message) {
-  each.header(wire.header, message.stamp_s);
+  each.header(wire.header, message.stamp_s, message.frame);
   each(wire.joint_names, message.names);
   each.list(wire.points, message.points, [&](auto& to, auto& point) {
     each(to.positions, point.positions);

@@ -44,6 +44,7 @@ struct TrajectoryMessage {
   std::vector<Point> points;
   std::uint64_t source = 0;  ///< as in JointMessage
   Latched latched = Latched::no;
+  std::string frame{};
 };
 
 /// crtk_msgs/OperatingState.
@@ -96,7 +97,7 @@ struct ImageMessage {
   bool is_bigendian = false;
   std::vector<std::uint8_t> data;
   std::uint64_t source = 0;  ///< as in JointMessage
-  std::string frame{};       ///< written, not read
+  std::string frame{};
 };
 
 /// sensor_msgs/CompressedImage.
@@ -105,7 +106,7 @@ struct CompressedImageMessage {
   std::string format;
   std::vector<std::uint8_t> data;
   std::uint64_t source = 0;  ///< as in JointMessage
-  std::string frame{};       ///< written, not read
+  std::string frame{};
 };
 
 /// sensor_msgs/CameraInfo of a camera with plumb_bob distortion, not rectified.
@@ -126,10 +127,10 @@ struct PoseMessage {
   std::array<double, 36> covariance{};  ///< row by row
 };
 
-/// geometry_msgs/PoseStamped: measured_cp, set_base_frame.
+/// geometry_msgs/PoseStamped: measured_cp, set_base_frame, tip_goal.
 struct PlaceMessage {
   double stamp_s = 0;
-  std::string frame;         ///< written, not read
+  std::string frame;
   Rigid3 pose;               ///< frame_from_body
   std::uint64_t source = 0;  ///< as in JointMessage
   Latched latched = Latched::no;

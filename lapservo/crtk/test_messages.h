@@ -23,12 +23,12 @@ struct Fields {
   static auto of(const TrajectoryMessage& m) {
     std::vector<std::pair<double, std::vector<double>>> points;
     for (const auto& point : m.points) points.emplace_back(point.time_s, point.positions);
-    return std::pair(m.names, points);
+    return std::tuple(m.names, points, m.frame);
   }
   static auto of(const ImageMessage& m) {
     return std::tie(m.width, m.height, m.step, m.encoding, m.is_bigendian, m.data);
   }
-  static auto of(const PlaceMessage& m) { return std::tie(m.pose); }
+  static auto of(const PlaceMessage& m) { return std::tie(m.pose, m.frame); }
   static auto of(const CompressedImageMessage& m) { return std::tie(m.format, m.data); }
 };
 
@@ -46,7 +46,8 @@ const JointMessage sample_joints{sample_stamp_s, {"yaw", "", "pitch"}, {0.25, 0,
 const OperatingStateMessage sample_state{sample_stamp_s, "ENABLED", true, false};
 const StringMessage sample_string{sample_stamp_s, "enable"};
 const JoyMessage sample_joy{sample_stamp_s, {1, 0, -3}};
-const TrajectoryMessage sample_trajectory{sample_stamp_s, {"s_rad"}, {{0, {1}}, {2.25, {3, 4}}}};
+const TrajectoryMessage sample_trajectory{sample_stamp_s, {"s_rad"},  {{0, {1}}, {2.25, {3, 4}}}, 0,
+                                          Latched::no,    "endoscope"};
 const ImageMessage sample_image{sample_stamp_s, 2, 1, 6, "bgr8", true, {1, 2, 3, 4, 5, 6}};
 const PlaceMessage sample_place{sample_stamp_s, "Cart", {Eigen::Quaterniond(0.5, -0.5, 0.5, 0.5), {1, -2, 3}}};
 const CompressedImageMessage sample_jpeg{sample_stamp_s, "jpeg", {7, 8}};

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <sstream>
+#include <string_view>
 #include <utility>
 
 #include <fmt/format.h>
@@ -54,16 +55,25 @@ std::string topic(const Rig& rig, const std::string& name) {
 }
 
 // Throws InputError for what makes no sense.
-Eigen::Vector4d features_of(const JointMessage& message) {
+Eigen::Vector4d features_of(const JointMessage& message, const std::string&) {
   if (message.names != feature_names() || message.positions.size() != FeatureVector::size ||
       !all_finite(message.positions))
     throw InputError("set_point", "expected four finite positions named s_rad, r_px, l_px, d_px");
   return Eigen::Vector4d(message.positions.data());
 }
 
+// Throws InputError where a goal of the tip is in another frame than the camera's. One without a name is in the
+// camera's; names of tf's first version begin with a slash.
+void refuse_other_frame(const char* goal, const std::string& frame, const std::string& camera) {
+  const auto bare = [](std::string_view name) { return name.substr(name.starts_with('/') ? 1 : 0); };
+  if (!frame.empty() && bare(frame) != bare(camera))
+    throw InputError(goal, "header.frame_id", printable(frame),
+                     camera + ", the camera's frame, or none: transform the goal into that frame");
+}
+
 // Throws InputError for what makes no sense, and for one of more than an hour or ten thousand points, which takes too
 // long to check.
-Trajectory trajectory_of(const TrajectoryMessage& message) {
+Trajectory trajectory_of(const TrajectoryMessage& message, const std::string& camera) {
   constexpr double longest_s = 3600;
   constexpr std::size_t most = 10000;
   const std::vector<std::string> places{"x_m", "y_m", "z_m"}, turned_places{"x_m", "y_m", "z_m", "roll_rad"};
@@ -72,6 +82,7 @@ Trajectory trajectory_of(const TrajectoryMessage& message) {
     throw InputError("trajectory", "expected the names s_rad, r_px, l_px, d_px, or x_m, y_m, z_m with roll_rad or not");
   if (message.points.empty() || message.points.size() > most || !(message.points.back().time_s <= longest_s))
     throw InputError("trajectory", fmt::format("expected 2 to {} points between 0 and {} s", most, longest_s));
+  if (of_tip) refuse_other_frame("trajectory", message.frame, camera);
   std::vector<double> times_s;
   std::vector<Eigen::Vector4d> features;
   std::vector<TipGoal> tips;
@@ -91,9 +102,10 @@ Trajectory trajectory_of(const TrajectoryMessage& message) {
                 : trajectory_through(std::move(times_s), std::move(features), "trajectory");
 }
 
-// Throws InputError for what is no pose.
-TipGoal tip_goal_of(const PlaceMessage& message) {
+// Throws InputError for what is no pose in the camera's frame.
+TipGoal tip_goal_of(const PlaceMessage& message, const std::string& camera) {
   constexpr double rounding = 1e-3;
+  refuse_other_frame("tip_goal", message.frame, camera);
   const Eigen::Quaterniond& turn = message.pose.rotation;
   TipGoal goal{message.pose.translation};
   if (turn.coeffs() != Eigen::Vector4d(0, 0, 0, 1)) {
@@ -243,12 +255,13 @@ bool LoopTopics::is_of_before(Latched latched) {
 
 // The last of all goals counts.
 template <typename Message, typename Goal>
-void LoopTopics::hear_goals(const char* name, Goal (*goal_of)(const Message&), std::optional<Goal> LoopWishes::*wish) {
+void LoopTopics::hear_goals(const char* name, Goal (*goal_of)(const Message&, const std::string& camera),
+                            std::optional<Goal> LoopWishes::*wish) {
   const auto hear_goal = [this, goal_of, wish](Message&& message) {
     std::optional<Goal> goal;
     std::string refusal;
     try {
-      goal = goal_of(message);
+      goal = goal_of(message, frames_.camera());
     } catch (const InputError& error) {
       refusal = std::string("refused: ") + error.what();
     }

@@ -45,9 +45,10 @@ struct LoopWishes {
 /// It hears /lapservo/NAME/command (StringStamped: start, start force; any other word stops), /lapservo/NAME/set_point
 /// (JointState: s_rad, r_px, l_px, d_px), /lapservo/NAME/tip_goal (PoseStamped of the tip in the camera's frame; an
 /// orientation of (0, 0, 0, 1), which messages have where nobody sets it, leaves the roll free) and
-/// /lapservo/NAME/trajectory (JointTrajectory of the four, or of x_m, y_m, z_m and roll_rad or without). A start that
-/// is repeated counts once: it would start the arm by itself after each hold. Latched starts and goals do not count,
-/// with a remark, until 1.5 s after the first call of wishes(), nor where their sender was connected before.
+/// /lapservo/NAME/trajectory (JointTrajectory of the four, or of x_m, y_m, z_m and roll_rad or without). Goals of the
+/// tip have the camera frame's name or none as their frame; others are refused. A start that is repeated counts once:
+/// it would start the arm by itself after each hold. Latched starts and goals do not count, with a remark, until 1.5 s
+/// after the first call of wishes(), nor where their sender was connected before.
 class LoopTopics {
  public:
   /// `hears`: whether it hears anything; else it only publishes.
@@ -72,7 +73,8 @@ class LoopTopics {
   void hear(const StringMessage& command);
   void hear_start(const StringMessage& command, bool force);
   template <typename Message, typename Goal>
-  void hear_goals(const char* name, Goal (*goal_of)(const Message&), std::optional<Goal> LoopWishes::*wish);
+  void hear_goals(const char* name, Goal (*goal_of)(const Message&, const std::string& camera),
+                  std::optional<Goal> LoopWishes::*wish);
   bool is_of_before(Latched latched);
   void remark(const std::string& text);
   bool may_be_old(double arm_heard_s);

@@ -1,5 +1,6 @@
 #include "lapservo/loop_topics/loop_topics.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <set>
@@ -251,8 +252,8 @@ TEST(LoopTopics, HearsTrajectories) {
 
 TEST(LoopTopics, HearsGoalsOfTheTip) {
   Loop loop;
-  const auto say = [&](const Eigen::Vector3d& place_m, const Eigen::Quaterniond& turn) {
-    return loop.hear("tip_goal", PlaceMessage{0, {}, {turn, place_m}});
+  const auto say = [&](const Eigen::Vector3d& place_m, const Eigen::Quaterniond& turn, const std::string& frame = {}) {
+    return loop.hear("tip_goal", PlaceMessage{0, frame, {turn, place_m}});
   };
   const Eigen::Vector3d place_m(0.01, -0.02, 0.12);
   const Eigen::Quaterniond unset(1, 0, 0, 0), turned(0.6, 0, 0.8, 0);
@@ -270,10 +271,25 @@ TEST(LoopTopics, HearsGoalsOfTheTip) {
     ASSERT_EQ(none.remarks.size(), 1u);
     EXPECT_NE(none.remarks.begin()->find(why), std::string::npos) << *none.remarks.begin();
   }
-  using Points = std::vector<TrajectoryMessage::Point>;
+
+  const TrajectoryMessage plan{0, {"x_m", "y_m", "z_m"}, {{0, {0, 0, 0.1}}, {2, {0.01, 0, 0.1}}}};
+  for (const std::string frame : {"", "endoscope", "/endoscope", "camera", "PSM1_rcm", "/", "//endoscope"}) {
+    TrajectoryMessage planned = plan;
+    planned.frame = frame;
+    const LoopWishes place = say(place_m, unset, frame), path = loop.hear("trajectory", planned);
+    const bool counts = frame.empty() || frame == "endoscope" || frame == "/endoscope";
+    EXPECT_EQ(place.tip_goal.has_value(), counts) << frame;
+    EXPECT_EQ(path.trajectory.has_value(), counts) << frame;
+    for (const auto& remarks : {place.remarks, path.remarks})
+      EXPECT_NE(counts, std::any_of(remarks.begin(), remarks.end(), [&](const std::string& remark) {
+                  return remark.find("header.frame_id: is " + frame + ", expected endoscope") != std::string::npos;
+                }));
+  }
+  TrajectoryMessage of_features{0, names, {{0, {0.9, 400, 180, 100}}, {2, {0.9, 420, 180, 100}}}};
+  of_features.frame = "camera";  // means nothing to them
+  EXPECT_TRUE(loop.hear("trajectory", of_features).trajectory);
   loop.transport.say("/lapservo/PSM1/tip_goal", PlaceMessage{0, {}, {unset, place_m}});
-  const LoopWishes last = loop.hear(
-      "trajectory", TrajectoryMessage{0, {"x_m", "y_m", "z_m"}, Points{{0, {0, 0, 0.1}}, {2, {0.01, 0, 0.1}}}});
+  const LoopWishes last = loop.hear("trajectory", plan);
   EXPECT_FALSE(last.tip_goal);  // what came last counts
   ASSERT_TRUE(last.trajectory && last.trajectory->tip_at(2));
   EXPECT_EQ(last.trajectory->tip_at(2)->position_m, Eigen::Vector3d(0.01, 0, 0.1));

@@ -48,7 +48,7 @@ template <typename Message>
 std::optional<Message> decode_ros1(std::span<const std::uint8_t> bytes) {
   auto from = MessageBytes::of_ros1(bytes);
   Message message;
-  if constexpr (requires { message.stamp_s; }) message.stamp_s = from.stamp_s();
+  if constexpr (requires { message.stamp_s; }) from.header(message);
   in_order(from, message);
   return from.is_all() ? std::optional(std::move(message)) : std::nullopt;
 }

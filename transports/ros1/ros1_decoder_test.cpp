@@ -42,6 +42,7 @@ TEST(Ros1Decoder, ReadsWhatRosWritesAndRefusesWhatIsCutShortOrLeftOver) {
   expect_read_whole_and_nothing_else(sample_state);
   expect_read_whole_and_nothing_else(sample_string);
   expect_read_whole_and_nothing_else(sample_trajectory);
+  expect_read_whole_and_nothing_else(sample_place);
   expect_read_whole_and_nothing_else(sample_joy);
   expect_read_whole_and_nothing_else(BoolMessage{true});
   expect_read_whole_and_nothing_else(sample_image);

@@ -73,7 +73,7 @@ template <typename Message>
 std::optional<Message> decode_cdr(std::span<const std::uint8_t> bytes) {
   auto from = MessageBytes::of_cdr(bytes);
   Message message;
-  message.stamp_s = from.stamp_s();
+  from.header(message);
   in_order(from, message);
   return from.is_all() ? std::optional(std::move(message)) : std::nullopt;
 }

@@ -118,7 +118,11 @@ struct TakeFromRos2 {
   requires std::is_arithmetic_v<Number>
   void operator()(const auto& from, Number& to) const { to = static_cast<Number>(from); }
   void written(const auto&, const auto&) const {}
-  void header(const auto& from, double& stamp_s, const std::string& = no_text) const { seconds(from.stamp, stamp_s); }
+  void header(const auto& from, double& stamp_s) const { seconds(from.stamp, stamp_s); }
+  void header(const auto& from, double& stamp_s, std::string& frame) const {
+    seconds(from.stamp, stamp_s);
+    (*this)(from.frame_id, frame);
+  }
   void seconds(const auto& from, double& to_s) const {
     to_s = from.nanosec < 1000000000u ? from.sec + 1e-9 * from.nanosec : std::numeric_limits<double>::quiet_NaN();
   }
