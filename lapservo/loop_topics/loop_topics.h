@@ -44,7 +44,7 @@ struct LoopWishes {
 /// and when something changes; /lapservo/NAME/overlay/compressed, drawn in a thread of its own, at most ten a second.
 /// It hears /lapservo/NAME/command (StringStamped: start, start force; any other word stops), /lapservo/NAME/set_point
 /// (JointState: s_rad, r_px, l_px, d_px), /lapservo/NAME/tip_goal (PoseStamped of the tip in the camera's frame; an
-/// orientation of (0, 0, 0, 1), which messages have where nobody sets it, leaves the roll free) and
+/// orientation of (0, 0, 0, 1) or of zeros, which messages have where nobody sets it, leaves the roll free) and
 /// /lapservo/NAME/trajectory (JointTrajectory of the four, or of x_m, y_m, z_m and roll_rad or without). Goals of the
 /// tip have the camera frame's name or none as their frame; others are refused. A start that is repeated counts once:
 /// it would start the arm by itself after each hold. Latched starts and goals do not count, with a remark, until 1.5 s

@@ -257,14 +257,18 @@ TEST(LoopTopics, HearsGoalsOfTheTip) {
   };
   const Eigen::Vector3d place_m(0.01, -0.02, 0.12);
   const Eigen::Quaterniond unset(1, 0, 0, 0), turned(0.6, 0, 0.8, 0);
-  const LoopWishes free = say(place_m, unset), given = say(place_m, turned);
-  ASSERT_TRUE(free.tip_goal && given.tip_goal);
-  EXPECT_EQ(free.tip_goal->position_m, place_m);
-  EXPECT_FALSE(free.tip_goal->camera_from_tip);
+  const LoopWishes given = say(place_m, turned);
+  ASSERT_TRUE(given.tip_goal);
+  for (const Eigen::Quaterniond& nobodys : {unset, Eigen::Quaterniond(0, 0, 0, 0)}) {
+    const LoopWishes free = say(place_m, nobodys);
+    ASSERT_TRUE(free.tip_goal);
+    EXPECT_EQ(free.tip_goal->position_m, place_m);
+    EXPECT_FALSE(free.tip_goal->camera_from_tip);
+  }
   EXPECT_TRUE(given.tip_goal->camera_from_tip->isApprox(turned));
   for (const auto& [bad_m, turn, why] : {std::tuple{Eigen::Vector3d(NAN, 0, 0.1), unset, "a finite number"},
                                          std::tuple{Eigen::Vector3d(10, -20, 120), unset, "looks like millimetres"},
-                                         std::tuple{place_m, Eigen::Quaterniond(0, 0, 0, 0), "a unit quaternion"},
+                                         std::tuple{place_m, Eigen::Quaterniond(0, 0, 0, 0.5), "a unit quaternion"},
                                          std::tuple{place_m, Eigen::Quaterniond(NAN, 0, 0, 0), "a unit quaternion"}}) {
     const LoopWishes none = say(bad_m, turn);
     EXPECT_FALSE(none.tip_goal);
