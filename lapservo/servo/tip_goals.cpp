@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <utility>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -199,12 +200,13 @@ Trajectory TipGoals::features_of(const Trajectory& goal) {
           [this, goal](double time_s) {
             const auto wanted = goal.tip_at(time_s);
             tip_wanted_ = wanted.has_value();
-            if (!wanted && psi_by_ == PsiBy::goal) psi_by_ = PsiBy::image;
+            const bool turned = std::exchange(roll_wanted_, wanted && (wanted->roll_rad || wanted->camera_from_tip));
+            const bool released = !wanted || (turned && !roll_wanted_);  // by a goal that leaves the roll as it is
+            if (released && psi_by_ == PsiBy::goal) psi_by_ = PsiBy::image;
             if (!wanted) return last_ = goal.at(time_s);
             if (const auto now = desired(goal, time_s)) {
               last_ = *now;
-              if (wanted->roll_rad || wanted->camera_from_tip)  // a free roll after it stays there
-                psi_rad_ = configuration(*wanted)->psi_rad, psi_by_ = PsiBy::goal;
+              if (roll_wanted_) psi_rad_ = configuration(*wanted)->psi_rad, psi_by_ = PsiBy::goal;
             } else {
               last_.rate.setZero(), last_.acceleration.setZero();
             }

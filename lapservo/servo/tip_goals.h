@@ -70,7 +70,8 @@ class TipGoals {
   std::vector<WristMotion> wrist_;
   double wrist_s_ = 0;       ///< when the wrist was there
   bool tip_wanted_ = false;  ///< by the goal of the last call
-  double psi_rad_ = 0;       ///< of a roll that is free
+  bool roll_wanted_ = false;
+  double psi_rad_ = 0;  ///< of a roll that is free
   enum class PsiBy { joints, image, goal } psi_by_ = PsiBy::joints;
   Eigen::Vector2d off_px_ = Eigen::Vector2d::Zero();  ///< the seen tip beside the registration's
   std::optional<double> corrected_s_;                 ///< by the image of that stamp

@@ -207,6 +207,27 @@ TEST(TipGoals, AFreeRollStaysWhereTheImageHasItSinceTheStart) {
   EXPECT_NEAR(psi_rad(), turned.psi_rad + two_pi, 1e-6);
 }
 
+TEST(TipGoals, AFreeRollEndsTheTurnOfTheGoalBefore) {
+  const Rig rig = rig_with(straight_tool());
+  TipGoals tips(rig, {});
+  const Eigen::Vector3d there_m = Truth{rig}.tip_at(there, {});
+  TipGoal goal{there_m, there.psi_rad + 1.3};
+  const Trajectory features = tips.features_of({0, {}, [&](double) { return goal; }});
+  JointVector turning = there;
+  const auto go_on = [&](double time_s, double turned_rad) {
+    turning.psi_rad = there.psi_rad + turned_rad;
+    tips.follow(joints_at(time_s, turning));
+    features.at(time_s);
+    tips.see(Truth{rig}.image_of(turning, time_s, rig), *rig.instruments[0].camera_from_rcm);
+    return tips.configuration(goal)->psi_rad - there.psi_rad;
+  };
+  EXPECT_NEAR(go_on(0, 0), 1.3, 1e-6);
+  EXPECT_NEAR(go_on(1, 0.2), 1.3, 1e-6);
+  goal = {there_m};
+  EXPECT_NEAR(go_on(2, 0.3), 0.3, 1e-6);
+  EXPECT_NEAR(go_on(3, 0.4), 0.3, 1e-6);  // a disturbance
+}
+
 class Refusals : public ::testing::Test {
  protected:
   Refusals() {
