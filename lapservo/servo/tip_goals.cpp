@@ -26,6 +26,7 @@ constexpr double step_s = 0.02;            // of differences by time
 constexpr double correction_time_s = 0.3;  // of the mean over images
 constexpr double wrist_time_s = 0.02;      // over which its readings count for how it moves
 constexpr double largest_sigma_m = 3e-3;   // of the tip by its tool: that of a place that is registered
+constexpr double wrist_rad_s = 6;          // a turn a second, which a hand hardly exceeds; WildJoints allows for more
 
 Eigen::Vector4d difference(const JointVector& from, const JointVector& to) {
   Eigen::Vector4d step = to.vector() - from.vector();
@@ -33,10 +34,16 @@ Eigen::Vector4d difference(const JointVector& from, const JointVector& to) {
   return step;
 }
 
+DesiredFeatures unknown() {
+  DesiredFeatures desired;
+  desired.features.setConstant(std::numeric_limits<double>::quiet_NaN());
+  return desired;
+}
+
 }  // namespace
 
-TipGoals::TipGoals(const Rig& rig, const Scales& scales) : rig_(rig), scales_(scales) {
-  last_.features.setConstant(std::numeric_limits<double>::quiet_NaN());
+TipGoals::TipGoals(const Rig& rig, const Scales& scales)
+    : rig_(rig), scales_(scales), wild_wrist_(Eigen::Vector4d::Constant(wrist_rad_s)), last_(unknown()) {
   use(rig.instruments.at(0).camera_from_rcm);
 }
 
@@ -78,10 +85,18 @@ void TipGoals::follow_wrist(const std::vector<double>& now_rad, double time_s) {
   constexpr double silence_s = 0.2;
   if (!std::isfinite(time_s)) return;
   const double passed_s = time_s - wrist_s_;
-  if (!std::all_of(now_rad.begin(), now_rad.end(), [](double angle) { return std::isfinite(angle); })) return;
-  if (now_rad.size() == wrist_.size() && !(passed_s > 0)) return;
+  if (!(passed_s > 0)) return;
   wrist_s_ = time_s;
-  if (now_rad.size() != wrist_.size() || passed_s > silence_s) {
+  const auto& tool = rig_.instruments[0].tool;
+  const std::size_t size = tool ? tool->wrist.size() : 0;
+  const bool read = now_rad.size() == size &&
+                    std::all_of(now_rad.begin(), now_rad.end(), [](double angle) { return std::isfinite(angle); });
+  Eigen::Vector4d now = Eigen::Vector4d::Zero();
+  static_assert(Tool::max_wrist_joints == decltype(now)::SizeAtCompileTime);
+  if (read) std::copy(now_rad.begin(), now_rad.end(), now.begin());
+  const auto verdict = read ? wild_wrist_.validate(time_s, now) : WildJoints::Verdict::wild;
+  if (verdict == WildJoints::Verdict::wild) return wrist_.clear();
+  if (wrist_.size() != size || verdict == WildJoints::Verdict::jumped || passed_s > silence_s) {
     wrist_.clear();
     for (const double angle_rad : now_rad) wrist_.push_back({angle_rad, angle_rad});
     return;
@@ -204,6 +219,7 @@ Trajectory TipGoals::features_of(const Trajectory& goal) {
             const bool released = !wanted || (turned && !roll_wanted_);  // by a goal that leaves the roll as it is
             if (released && psi_by_ == PsiBy::goal) psi_by_ = PsiBy::image;
             if (!wanted) return last_ = goal.at(time_s);
+            if (!marker_from_tip(0)) return unknown();
             if (const auto now = desired(goal, time_s)) {
               last_ = *now;
               if (roll_wanted_) psi_rad_ = configuration(*wanted)->psi_rad, psi_by_ = PsiBy::goal;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -9,6 +10,7 @@
 #include "lapservo/control/controller_config.h"
 #include "lapservo/control/image_measurement.h"
 #include "lapservo/control/trajectory.h"
+#include "lapservo/control/wild_joints.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/robot/robot.h"
 
@@ -30,11 +32,13 @@ class TipGoals {
 
   /// The same trajectory in features, by all that is known at each call; refers to this. Where no configuration
   /// holds the tip at the goal, or the wrist has bent until its tip is left open by more than 3 mm, the features rest
-  /// where they were, and are NaN before the first.
+  /// where they were, and are NaN before the first. They are NaN, for which the loop holds, where the wrist is not
+  /// known.
   Trajectory features_of(const Trajectory& goal);
 
   /// A state of the joints: where the wrist is, how it moves; the psi of a roll that is free until an image has it,
-  /// anew from every start on.
+  /// anew from every start on. The wrist is not known by readings that are missing or not finite, nor by those that no
+  /// wrist can have come to since the last ones, until three of them agree.
   void follow(const JointState& joints);
   /// The registration from now on; nullopt while it is measured anew.
   void use(const std::optional<Rigid3>& camera_from_rcm);
@@ -42,7 +46,7 @@ class TipGoals {
   void see(const ImageMeasurement& image, const Rigid3& camera_from_rcm);
 
   /// Readings of the wrist's joints, in the tool's order, moved on by `ahead_s` as they move [rad]; none for a straight
-  /// tool. Nullopt without a tool and where the arm does not measure all of its joints.
+  /// tool. Nullopt without a tool and where the wrist is not known.
   std::optional<std::vector<double>> wrist_rad(double ahead_s) const;
   /// The configuration for a goal, corrected by the images, with the wrist as it is after `ahead_s`.
   std::optional<JointVector> configuration(const TipGoal& goal, double ahead_s = 0) const;
@@ -67,9 +71,10 @@ class TipGoals {
     double rad = 0;  ///< as it was read last
     double smooth_rad = 0, rad_s = 0, rad_s2 = 0;
   };
-  std::vector<WristMotion> wrist_;
-  double wrist_s_ = 0;       ///< when the wrist was there
-  bool tip_wanted_ = false;  ///< by the goal of the last call
+  std::vector<WristMotion> wrist_;  ///< empty where it is not known
+  WildJoints wild_wrist_;
+  double wrist_s_ = -std::numeric_limits<double>::infinity();  ///< of the last readings
+  bool tip_wanted_ = false;                                    ///< by the goal of the last call
   bool roll_wanted_ = false;
   double psi_rad_ = 0;  ///< of a roll that is free
   enum class PsiBy { joints, image, goal } psi_by_ = PsiBy::joints;

@@ -181,6 +181,26 @@ TEST(TipGoals, FollowTheWrist) {
   }
 }
 
+// So that the loop holds.
+TEST(TipGoals, AreNotANumberWhereTheWristIsNotKnown) {
+  const Rig rig = rig_with(placed_tool());
+  TipGoals tips(rig, {});
+  const std::vector<double> usual{0.2, -0.1}, jumped{1.6, -0.1};
+  const Trajectory features = tips.features_of(tip_set_point({Truth{rig}.tip_at(there, usual)}, ""));
+  const struct {
+    std::vector<double> wrist_rad;
+    bool known;
+  } readings[] = {{usual, true},  {usual, true},  {{NAN, -0.1}, false}, {usual, true},           {{}, false},
+                  {{0.2}, false}, {usual, true},  {jumped, false},      {jumped, false},         {jumped, true},
+                  {usual, false}, {jumped, true}, {jumped, true},       {{1.6, INFINITY}, false}};
+  for (int k = 0; const auto& [wrist_rad, known] : readings) {
+    const double time_s = k++ / 120.0;
+    tips.follow(joints_at(time_s, there, wrist_rad));
+    EXPECT_EQ(tips.wrist_rad(0).has_value(), known) << k;
+    EXPECT_EQ(features.at(time_s).features.allFinite(), known) << k;
+  }
+}
+
 TEST(TipGoals, AFreeRollStaysWhereTheImageHasItSinceTheStart) {
   const Rig rig = rig_with(straight_tool());
   TipGoals tips(rig, {});
