@@ -117,7 +117,7 @@ void add_tip(ControlTick& tick, const Instrument& instrument, const TipGoals& ti
   if (!tick.seen || !instrument.tool) return;
   Observation& seen = tick.seen->observations.front();
   const double exposed_s = tick.seen->measurement.time_s - tick.decision.control.delay_s;
-  if (const auto wrist_rad = tips.wrist_rad(exposed_s - tick.input.time_s))
+  if (const auto wrist_rad = tips.past_wrist_rad(tick.input.time_s - exposed_s))
     seen.tip = tip_of(seen, *instrument.tool, *wrist_rad);
 }
 
@@ -130,7 +130,7 @@ void watch_tip(ControlTick& tick, const Trajectory& trajectory, double begun_s,
   tips.see(image, tick.seen->first_from_camera.inverse() * *first_from_rcm);
   const double exposed_s = image.time_s - tick.decision.control.delay_s;
   const auto goal = trajectory.tip_at(exposed_s - begun_s);
-  if (goal && image.found) tick.tip_error_px = tips.error_px(image, *goal, exposed_s - tick.input.time_s);
+  if (goal && image.found) tick.tip_error_px = tips.error_px(image, *goal, tick.input.time_s - exposed_s);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <iterator>
 #include <limits>
 #include <utility>
 
@@ -95,8 +96,12 @@ void TipGoals::follow_wrist(const std::vector<double>& now_rad, double time_s) {
   static_assert(Tool::max_wrist_joints == decltype(now)::SizeAtCompileTime);
   if (read) std::copy(now_rad.begin(), now_rad.end(), now.begin());
   const auto verdict = read ? wild_wrist_.validate(time_s, now) : WildJoints::Verdict::wild;
-  if (verdict == WildJoints::Verdict::wild) return wrist_.clear();
-  if (wrist_.size() != size || verdict == WildJoints::Verdict::jumped || passed_s > silence_s) {
+  if (verdict != WildJoints::Verdict::plausible) wrist_.clear(), past_wrist_.clear();
+  if (verdict == WildJoints::Verdict::wild) return;
+  constexpr double kept_s = 1;  // images are at most 0.6 s old when they come, and 0.3 s late by their stamps
+  while (!past_wrist_.empty() && past_wrist_.front().time_s < time_s - kept_s) past_wrist_.pop_front();
+  past_wrist_.push_back({time_s, now_rad});
+  if (wrist_.size() != size || passed_s > silence_s) {
     wrist_.clear();
     for (const double angle_rad : now_rad) wrist_.push_back({angle_rad, angle_rad});
     return;
@@ -122,10 +127,23 @@ std::optional<std::vector<double>> TipGoals::wrist_rad(double ahead_s) const {
   return wrist_rad;
 }
 
-std::optional<Rigid3> TipGoals::marker_from_tip(double ahead_s) const {
-  const auto wrist = wrist_rad(ahead_s);
+std::optional<std::vector<double>> TipGoals::past_wrist_rad(double ago_s) const {
+  if (past_wrist_.empty() || !rig_.instruments[0].tool) return wrist_rad(0);
+  const double time_s = wrist_s_ - ago_s;
+  const auto after = std::find_if(past_wrist_.begin(), past_wrist_.end(),
+                                  [&](const WristReading& reading) { return !(reading.time_s < time_s); });
+  if (after == past_wrist_.begin()) return after->rad;
+  if (after == past_wrist_.end()) return past_wrist_.back().rad;
+  const WristReading& before = *std::prev(after);
+  const double part = (time_s - before.time_s) / (after->time_s - before.time_s);
+  std::vector<double> wrist_rad = before.rad;
+  for (std::size_t i = 0; i < wrist_rad.size(); ++i) wrist_rad[i] += part * (after->rad[i] - before.rad[i]);
+  return wrist_rad;
+}
+
+std::optional<Rigid3> TipGoals::marker_from_tip(const std::optional<std::vector<double>>& wrist_rad) const {
   const auto& tool = rig_.instruments[0].tool;
-  return wrist && tool->place ? std::optional(tip_in_marker(*tool, *wrist).marker_from_tip) : std::nullopt;
+  return wrist_rad && tool->place ? std::optional(tip_in_marker(*tool, *wrist_rad).marker_from_tip) : std::nullopt;
 }
 
 double TipGoals::tip_sigma_m(double ahead_s) const {
@@ -136,7 +154,7 @@ double TipGoals::tip_sigma_m(double ahead_s) const {
 }
 
 void TipGoals::see(const ImageMeasurement& image, const Rigid3& camera_from_rcm) {
-  const auto tip = marker_from_tip(0);
+  const auto tip = marker_from_tip(wrist_rad(0));
   if (!tip || !image.found || !image.camera_from_marker) return;
   const auto shown =
       newton_inverse(feature_model(rig_, camera_from_rcm), image.features, image.q.value_or(q_), scales_);
@@ -159,7 +177,7 @@ void TipGoals::see(const ImageMeasurement& image, const Rigid3& camera_from_rcm)
 }
 
 std::optional<JointVector> TipGoals::configuration(const TipGoal& goal, double ahead_s) const {
-  const auto tip = marker_from_tip(ahead_s);
+  const auto tip = marker_from_tip(wrist_rad(ahead_s));
   const double depth_m = goal.position_m.z();
   if (!tip || !camera_from_rcm_ || !(depth_m > nearest_m) || tip_sigma_m(ahead_s) > largest_sigma_m)
     return std::nullopt;
@@ -176,14 +194,14 @@ std::optional<JointVector> TipGoals::configuration(const TipGoal& goal, double a
 }
 
 std::optional<Eigen::Vector3d> TipGoals::tip_at(const JointVector& q) const {
-  const auto tip = marker_from_tip(0);
+  const auto tip = marker_from_tip(wrist_rad(0));
   if (!tip || !camera_from_rcm_) return std::nullopt;
   return lapservo::camera_from_marker(rig_.instruments[0].marker, *camera_from_rcm_, q) * tip->translation;
 }
 
 std::optional<Eigen::Vector2d> TipGoals::error_px(const ImageMeasurement& image, const TipGoal& goal,
-                                                  double ahead_s) const {
-  const auto tip = marker_from_tip(ahead_s);
+                                                  double ago_s) const {
+  const auto tip = marker_from_tip(past_wrist_rad(ago_s));
   if (!tip || !image.camera_from_marker) return std::nullopt;
   const Eigen::Vector3d seen_m = *image.camera_from_marker * tip->translation;
   if (!(std::min(seen_m.z(), goal.position_m.z()) > nearest_m)) return std::nullopt;
@@ -219,7 +237,7 @@ Trajectory TipGoals::features_of(const Trajectory& goal) {
             const bool released = !wanted || (turned && !roll_wanted_);  // by a goal that leaves the roll as it is
             if (released && psi_by_ == PsiBy::goal) psi_by_ = PsiBy::image;
             if (!wanted) return last_ = goal.at(time_s);
-            if (!marker_from_tip(0)) return unknown();
+            if (!marker_from_tip(wrist_rad(0))) return unknown();
             if (const auto now = desired(goal, time_s)) {
               last_ = *now;
               if (roll_wanted_) psi_rad_ = configuration(*wanted)->psi_rad, psi_by_ = PsiBy::goal;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <deque>
 #include <limits>
 #include <optional>
 #include <string>
@@ -48,16 +49,18 @@ class TipGoals {
   /// Readings of the wrist's joints, in the tool's order, moved on by `ahead_s` as they move [rad]; none for a straight
   /// tool. Nullopt without a tool and where the wrist is not known.
   std::optional<std::vector<double>> wrist_rad(double ahead_s) const;
+  /// The same as it was `ago_s` before, by the readings of the last second: between two of them, or the nearest one.
+  std::optional<std::vector<double>> past_wrist_rad(double ago_s) const;
   /// The configuration for a goal, corrected by the images, with the wrist as it is after `ahead_s`.
   std::optional<JointVector> configuration(const TipGoal& goal, double ahead_s = 0) const;
   /// Where the registration has the tip.
   std::optional<Eigen::Vector3d> tip_at(const JointVector& q) const;
-  /// The seen tip beside a goal, in ideal pixels, by an image that was exposed after `ahead_s`, below 0.
-  std::optional<Eigen::Vector2d> error_px(const ImageMeasurement& image, const TipGoal& goal, double ahead_s) const;
+  /// The seen tip beside a goal, in ideal pixels, by an image that was exposed `ago_s` before.
+  std::optional<Eigen::Vector2d> error_px(const ImageMeasurement& image, const TipGoal& goal, double ago_s) const;
 
  private:
   std::optional<DesiredFeatures> desired(const Trajectory& goal, double time_s) const;
-  std::optional<Rigid3> marker_from_tip(double ahead_s) const;
+  std::optional<Rigid3> marker_from_tip(const std::optional<std::vector<double>>& wrist_rad) const;
   /// In the direction in which the tool leaves it open most.
   double tip_sigma_m(double ahead_s) const;
   void follow_wrist(const std::vector<double>& now_rad, double time_s);
@@ -72,6 +75,11 @@ class TipGoals {
     double smooth_rad = 0, rad_s = 0, rad_s2 = 0;
   };
   std::vector<WristMotion> wrist_;  ///< empty where it is not known
+  struct WristReading {
+    double time_s = 0;
+    std::vector<double> rad;
+  };
+  std::deque<WristReading> past_wrist_;  ///< since when it is known
   WildJoints wild_wrist_;
   double wrist_s_ = -std::numeric_limits<double>::infinity();  ///< of the last readings
   bool tip_wanted_ = false;                                    ///< by the goal of the last call

@@ -1,11 +1,13 @@
 #include "lapservo/servo/tip_goals.h"
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 
 #include <gtest/gtest.h>
 
 #include "lapservo/core/angles.h"
+#include "lapservo/core/minimum_jerk.h"
 #include "lapservo/core/random.h"
 #include "lapservo/geometry/rotation.h"
 #include "lapservo/kinematics/tip_kinematics.h"
@@ -172,13 +174,33 @@ TEST(TipGoals, FollowTheWrist) {
     EXPECT_LT((Truth{rig}.tip_at(*q, wrist_rad) - goal_m).norm(), 1e-12);
     EXPECT_LT((model(q->vector())->features - now.features).norm(), 1e-9);
     if (k < 60) continue;
-    EXPECT_NEAR(tips.wrist_rad(-0.05)->at(0), wrist_rad[0] - 0.5 * 0.05, 1e-3);
     tips.follow(joints_at(time_s, there, {wrist_rad[0] + 0.5 * 1e-3, -0.1}));  // no later: it does not count
     const auto later = tips.configuration({goal_m}, 1e-3);
     const Eigen::Vector4d rate = (model(later->vector())->features - now.features) / 1e-3;
     EXPECT_LT((rate - now.rate).cwiseQuotient(Eigen::Vector4d(1e-3, 1, 1, 1)).norm(), 0.3);
     EXPECT_GT(now.rate.norm(), 5);
   }
+}
+
+// As an image shows it that comes 0.3 s late: to move on by the speed of now errs by 0.28 rad.
+TEST(TipGoals, KnowTheWristOfTheLastSecondByItsReadings) {
+  TipGoals tips(rig_with(placed_tool()), {});
+  EXPECT_FALSE(tips.past_wrist_rad(0.1));
+  const auto pitch_rad = [](double time_s) { return 0.6 * MinimumJerk::position(std::clamp(time_s / 0.5, 0.0, 1.0)); };
+  Random random(84);
+  for (int k = 0; k <= 240; ++k) {
+    const double time_s = k / 120.0;
+    tips.follow(joints_at(time_s, there, {pitch_rad(time_s), -0.1 + 1e-3 * random.normal()}));
+    for (const double ago_s : {0.0, 0.103, 0.3, 0.9}) {
+      const auto then = tips.past_wrist_rad(ago_s);
+      ASSERT_TRUE(then);
+      EXPECT_NEAR(then->at(0), pitch_rad(time_s - ago_s), 1e-3) << time_s << ' ' << ago_s;
+      EXPECT_NEAR(then->at(1), -0.1, 5e-3);  // noise stays as it is read
+    }
+  }
+  EXPECT_EQ(tips.past_wrist_rad(-0.01), tips.wrist_rad(0));  // the last one
+  tips.follow(joints_at(2.01, there, {NAN, -0.1}));
+  EXPECT_FALSE(tips.past_wrist_rad(0.1));
 }
 
 // So that the loop holds.
