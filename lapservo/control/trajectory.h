@@ -19,8 +19,8 @@ struct DesiredFeatures {
   Eigen::Vector4d acceleration = Eigen::Vector4d::Zero();
 };
 
-/// Where the tip of the instrument's tool is wanted, in the camera's frame. The roll is psi, or what comes nearest to
-/// an orientation of the tip; without either it is free and stays as it is.
+/// Where the tip of the instrument's tool is wanted, in the camera's frame. The roll is psi but for whole turns, or
+/// what comes nearest to an orientation of the tip; without either it is free and stays as it is.
 struct TipGoal {
   Eigen::Vector3d position_m = Eigen::Vector3d::Zero();
   std::optional<double> roll_rad{};
@@ -65,7 +65,7 @@ Trajectory trajectory_through(std::vector<double> times_s, std::vector<Eigen::Ve
 /// from the camera, which look like millimetres.
 Trajectory tip_set_point(const TipGoal& goal, const std::string& source);
 
-/// The same spline through places of the tip, with its roll or without.
+/// The same spline through places of the tip, with its roll, which turns the shorter way between two, or without.
 Trajectory tip_trajectory_through(std::vector<double> times_s, const std::vector<TipGoal>& goals,
                                   const std::string& source);
 

@@ -1,13 +1,17 @@
 #include "lapservo/servo/goal_check.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include <fmt/format.h>
 
 #include "lapservo/control/trajectory_check.h"
+#include "lapservo/core/angles.h"
 #include "lapservo/core/error.h"
 #include "lapservo/core/random.h"
+#include "lapservo/kinematics/centre_line.h"
+#include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/servo/image_features.h"
 #include "lapservo/servo/tip_goals.h"
 
@@ -19,6 +23,28 @@ struct Reach {
   const TipGoals& tips;
   const FeatureModel& model;
   const ControllerConfig& config;
+  const Rig& rig;
+  const std::optional<Rigid3>& camera_from_rcm;
+  JointVector before;  ///< at the start the joints, then of the step before
+  bool is_on_its_way = false;
+
+  std::optional<CentreLine> line_at(const JointVector& q) const {
+    return centre_line(rig.camera, rig.instruments[0].marker, *camera_from_rcm * rcm_from_unrolled(q), q.psi_rad);
+  }
+
+  // Of the turns that hold the tip alike the one to which the features lead from the step before: d jumps where the
+  // marker's seam passes the centre line, so the shaft turns the way on which it does not, be it the longer one.
+  std::optional<JointVector> configuration(const TipGoal& goal) const {
+    auto q = tips.configuration(goal);
+    const auto here = q ? line_at(before) : std::nullopt, there = q ? line_at(*q) : std::nullopt;
+    if (!here || !there) return q;
+    const double turn_rad =
+        wrap_pi(there->facing_azimuth_rad - here->facing_azimuth_rad) - there->tau_rad + here->tau_rad;
+    q->psi_rad += two_pi * std::round((before.psi_rad + turn_rad - q->psi_rad) / two_pi);
+    return q;
+  }
+
+  bool passes_seam(const JointVector& q) const { return is_on_its_way && std::abs(q.psi_rad - before.psi_rad) > pi; }
 
   std::optional<std::string> broken_at(const Eigen::Vector4d& q, const Eigen::Vector4d& feature_rate) const {
     const auto state = model ? model(q) : std::nullopt;
@@ -30,8 +56,9 @@ struct Reach {
   std::optional<std::string> broken(const TipGoal& goal, const Eigen::Vector4d& feature_rate) const {
     if (!goal.position_m.allFinite()) return "its place is not finite";
     if (!(goal.position_m.z() > 0)) return "it lies behind the camera";
-    const auto q = tips.configuration(goal);
+    const auto q = configuration(goal);
     if (!q) return "no configuration holds the tip there: it lies too near to the RCM or to the camera";
+    if (passes_seam(*q)) return "the marker's seam faces the camera there, where the features jump";
     return broken_at(q->vector(), feature_rate);
   }
 
@@ -41,9 +68,14 @@ struct Reach {
     constexpr int draws = 4000;
     constexpr double last_spread = 1e-4;
     const JointLimits& limits = config.limits;
-    const auto wanted = goal.position_m.z() > 0 ? tips.configuration(goal) : std::nullopt;
-    if (wanted && !(wanted->psi_rad >= limits.lower[3] && wanted->psi_rad <= limits.upper[3]))
-      return fmt::format("; rolls of {:.4g} to {:.4g} rad can be reached", limits.lower[3], limits.upper[3]);
+    const auto wanted = goal.position_m.z() > 0 ? configuration(goal) : std::nullopt;
+    const auto line = wanted ? line_at(*wanted) : std::nullopt;
+    const bool too_far = wanted && !(wanted->psi_rad >= limits.lower[3] && wanted->psi_rad <= limits.upper[3]);
+    if (line && (too_far || passes_seam(*wanted))) {
+      const double seam_rad = wanted->psi_rad + line->tau_rad;
+      return fmt::format("; rolls of {:.4g} to {:.4g} rad can be reached without the marker's seam facing the camera",
+                         std::max(limits.lower[3], seam_rad - two_pi), std::min(limits.upper[3], seam_rad));
+    }
     Random random(1);
     Eigen::Vector4d best = q_start;
     if (wanted) best[3] = wanted->psi_rad;
@@ -78,7 +110,7 @@ void refuse_goal(const Trajectory& goal, double duration_s, const Rig& rig,
   tips.follow(joints);
   tips.refuse_incomplete(source, true);
   const Trajectory features = tips.features_of(goal);
-  const Reach reach{tips, model, config};
+  Reach reach{tips, model, config, rig, camera_from_rcm, joints.q};
   const auto steps = static_cast<long>(std::ceil(duration_s / step_s));
   for (long i = 0; i <= steps; ++i) {
     const double time_s = step_s * static_cast<double>(i);
@@ -87,6 +119,8 @@ void refuse_goal(const Trajectory& goal, double duration_s, const Rig& rig,
       throw InputError(source, fmt::format("has no goal of the tip at {:.2f} s, expected one at any time", time_s));
     if (const auto why = reach.broken(*wanted, features.at(time_s).rate))
       throw InputError(source, Infeasible{time_s, *why}.text() + reach.nearest_text(*wanted, joints.q.vector()));
+    reach.before = reach.configuration(*wanted).value();
+    reach.is_on_its_way = true;
   }
 }
 

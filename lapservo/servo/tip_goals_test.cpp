@@ -318,7 +318,7 @@ TEST_F(Refusals, GoalsOutOfReachHaveTheNearestThatIsNot) {
                      {{rig.instruments[0].camera_from_rcm->translation}, "too near to the RCM"}};
   const std::string roll = refused({here_m, limits.upper[3] + 0.2});
   EXPECT_NE(roll.find("limits.upper psi_rad"), std::string::npos) << roll;
-  EXPECT_NE(roll.find("; rolls of -4 to 4 rad can be reached"), std::string::npos) << roll;
+  EXPECT_NE(roll.find("; rolls of -1.571 to 4 rad can be reached"), std::string::npos) << roll;
   Random random(83);
   for (const auto& [goal, why] : goals) {
     const std::string text = refused(goal);
@@ -366,6 +366,33 @@ TEST_F(Refusals, ATipThatABentWristLeavesOpenIsNeitherAcceptedNorFollowed) {
   tips.follow(joints_at(1, there, bent_rad));
   EXPECT_EQ(features.at(1).features, followed);
   EXPECT_TRUE(features.at(1).rate.isZero());
+}
+
+// The seam faces the camera at psi -1.571 and a turn on: d jumps there, and the shaft turns the other way round.
+TEST_F(Refusals, ARollCountsByTheTurnToWhichTheFeaturesLead) {
+  const struct {
+    double psi_rad, roll_rad;
+    std::string why;
+  } goals[] = {{1.2, -1.5, ""},
+               {1.2, -1.8, "limits.upper psi_rad 4: needs 4.483"},  // within the limits, and not reached
+               {1.2, two_pi - 1.5, ""},
+               {3.5, -1, ""},  // by the longer way
+               {3.5, two_pi - 1, ""},
+               {-3, -1.8, ""},
+               {-3, 2.5, ""},
+               {-3, 1.2, "limits.lower psi_rad -4: needs -5.083"}};
+  for (const auto& [psi_rad, roll_rad, why] : goals) {
+    joints.q.psi_rad = psi_rad;
+    const std::string text = refused({here_m, roll_rad});
+    EXPECT_EQ(text.empty(), why.empty()) << text;
+    EXPECT_NE(text.find(why), std::string::npos) << text;
+  }
+  joints.q = there;
+  const Trajectory turning{0, {}, [&](double time_s) { return TipGoal{here_m, -1 - 0.1 * time_s}; }};
+  const std::string text = testing::input_error(
+      [&] { refuse_goal(turning, 10, rig, rig.instruments[0].camera_from_rcm, controller, joints, "--trajectory"); });
+  EXPECT_NE(text.find("can't be followed at 5.72 s: the marker's seam faces the camera"), std::string::npos) << text;
+  EXPECT_NE(text.find("; rolls of -1.571 to 4 rad can be reached"), std::string::npos) << text;
 }
 
 TEST_F(Refusals, SayWhatIsMissing) {

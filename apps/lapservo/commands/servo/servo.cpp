@@ -58,6 +58,8 @@ JointVector joints_at_start(const ServoOptions& options, const Trajectory& traje
     amid_limits.q = JointVector::from_vector((limits.lower + limits.upper) / 2);
     if (const auto& tool = run.rig.instruments.front().tool) amid_limits.wrist_rad = simulated_wrist_rad(*tool, 0);
     tips.follow(amid_limits);
+    // The start is drawn later, on the goal's side of the marker's seam.
+    if (const auto q = tips.configuration(*trajectory.tip_at(0))) amid_limits.q = *q;
     refuse_goal(trajectory, options.duration_s(), run.rig, run.rig.instruments.front().camera_from_rcm, run.controller,
                 amid_limits, run.trajectory_name);
   }
@@ -231,7 +233,7 @@ void add_trajectory_options(Command command, ServoOptions& options) {
       "--tip", options.tip, finite_numbers(),
       "Instead: x,y,z or x,y,z,roll of the tip in the camera's frame, metres and rad, to reach and keep, by "
       "the rig's camera_from_rcm and tool. The image closes it across the line of sight; in depth the rig "
-      "counts. roll is psi; without it the roll stays");
+      "counts. roll is psi but for whole turns; without it the roll stays");
   command.add_option("--via", options.via, finite_numbers(),
                      "Instead: points s_rad,r_px,l_px,d_px,s_rad,... to pass, a second at rest in each");
   command.add_option("--duration", options.duration, between(0.1, 36000.0), "Seconds, else 20, or all of a recording");
