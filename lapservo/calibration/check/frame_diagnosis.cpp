@@ -229,7 +229,7 @@ const char* usual_cause(Status status) {
     case Status::uncertain:
       return "the marker is too small, too dark, blurred or compressed for psi; come nearer, more light, a shorter "
              "exposure, less compression, and where the rig's sigma_camera_matrix or sigma_response is large, lapservo "
-             "calibrate camera";
+             "calibrate camera. Or it is hidden in part and misses the rig's RCM: lapservo calibrate registration";
     case Status::marker_mismatch:
       return "the print is not as the rig says; lapservo calibrate marker measures it from a slow turn";
     case Status::damaged:

@@ -154,7 +154,8 @@ Status validate(const Scene& scene, const FineFit& fit) {
   if (!shows_enough(scene, agreement, fit)) return is_cut ? Status::cut : Status::occluded;
   if (agreement.wrong > limits.max_wrong || agreement.beyond > limits.max_beyond || !agrees_well(fit))
     return Status::poor_fit;
-  if (scene.registration && !fit.unknowns.through_rcm() && !fit.is_well_seen()) return Status::uncertain;
+  const bool is_held = fit.unknowns.through_rcm();
+  if (scene.registration && (is_held ? fit.misses_rcm : !fit.is_well_seen())) return Status::uncertain;
   return validate_psi(scene, fit);
 }
 

@@ -121,6 +121,7 @@ TEST(Verification, AFitWithoutSupportOrOfAnotherPrintIsNotOk) {
   EXPECT_EQ(status_with([](FineFit& fit) { fit.used[0] = fit.used[3] = 0; }), Status::occluded);
   EXPECT_EQ(status_with([](FineFit& fit) { fit.covariance(psi_unknown, psi_unknown) = 0.01; }), Status::uncertain);
   EXPECT_EQ(status_with([](FineFit& fit) { fit.inlier_rms_sigmas = 4; }), Status::poor_fit);
+  EXPECT_EQ(status_with([](FineFit& fit) { fit.misses_rcm = true; }), Status::uncertain) << "held at it all the same";
   EXPECT_EQ(status_with([](FineFit& fit) { fit.off_probability = 0.5; }), Status::ok)
       << "psi is right with either print";
   FineFit off = right;

@@ -261,6 +261,7 @@ class Fitter {
     fit_.off_probability = print.off_probability;
     fit_.p_false = print.p_false, fit_.p_false_by_tolerance = print.p_false_by_tolerance;
     fit_.psi_variance_by_tolerance = print.psi_variance_by_tolerance;
+    fit_.misses_rcm = print.misses_rcm;
     fit_.converged = true;
   }
 

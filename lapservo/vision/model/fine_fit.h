@@ -46,6 +46,7 @@ struct FineFit {
   double inlier_rms_sigmas = 0;   ///< of the boundaries' residuals, print errors taken out, by noise and tolerated_px
   double off_probability = 0, p_false = 1, p_false_by_tolerance = 0;  ///< as PrintFit has them
   double psi_variance_by_tolerance = 0;         ///< of the covariance, what the rig's tolerance of the print adds
+  bool misses_rcm = false;                      ///< as PrintFit has it
   bool asked = false;                           ///< what the camera did to the image
   Processing processing = Processing::unknown;  ///< as far as wanted
   int processing_explained = 0;                 ///< how often ProcessingEvidence::explained
@@ -79,7 +80,8 @@ struct Expected {
 
 /// Fits the pose to all boundaries on all visible generatrices and to the shaft's sides, located to a fraction of a
 /// pixel in linear light, with a robust loss. `start` must be good to some pixels. The result is held at the RCM where
-/// the scene has a registration and the image does not contradict it, whatever the start is.
+/// the scene has a registration, whatever the start is, unless a well seen marker misses it or it lies beyond the
+/// marker.
 FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknowns& start,
                    const Expected& expected = {});
 

@@ -145,12 +145,10 @@ std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const std
   const PrintSums by_image = print_sums(measurements, film_prior, errors);
   const Hypotheses prior = prior_hypotheses(marker, is_known);
   PrintFit fit;
-  const auto is_contradicted = [&] {
-    if (!rcm->measurement.is_proximal) return true;
-    return rcm->may_be_contradicted &&
-           missed_by_image(by_image, rcm->measurement, prior, errors.doubt, marker) > limits.contradicted_sigmas;
-  };
-  fit.through_rcm = rcm && !is_contradicted();
+  const bool is_proximal = rcm && rcm->measurement.is_proximal;
+  fit.misses_rcm = rcm && (!is_proximal || missed_by_image(by_image, rcm->measurement, prior, errors.doubt, marker) >
+                                               limits.contradicted_sigmas);
+  fit.through_rcm = is_proximal && !(fit.misses_rcm && rcm->may_be_contradicted);
   const PrintSums sums = fit.through_rcm ? held(by_image, rcm->measurement) : by_image;
   const auto print = mixed(sums, prior, errors.doubt, marker);
   if (!print) return std::nullopt;

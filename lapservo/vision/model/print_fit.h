@@ -51,8 +51,10 @@ struct PrintFit {
   PoseMatrix covariance;               ///< of the pose's unknowns
   /// d(the pose's unknowns)/d(RCM in the camera frame) [1/m].
   Eigen::Matrix<double, pose_unknowns, 3> by_rcm_m = Eigen::Matrix<double, pose_unknowns, 3>::Zero();
-  /// Held at the RCM: what the image alone shows, whatever the print is, does not miss it by contradicted_sigmas.
-  bool through_rcm = false;
+  /// The RCM lies beyond the marker, or contradicted_sigmas and more beside the shaft that the image alone shows,
+  /// whatever the print is.
+  bool misses_rcm = false;
+  bool through_rcm = false;              ///< held at the RCM, which it misses only where it may not be contradicted
   double off_probability = 0;            ///< that the print is off by print_limits.off_mm and more
   double p_false = 1;                    ///< that psi is wrong
   double p_false_by_tolerance = 0;       ///< what the rig's tolerance adds to it
@@ -60,7 +62,7 @@ struct PrintFit {
 };
 
 /// The RCM beside a fit: how far the shaft passes it, whether the passes held it there, and whether the frame shows
-/// enough to contradict it.
+/// enough to be fitted without it where it misses it.
 struct RcmBesideFit {
   RcmMeasurement measurement;
   bool held_by_passes = false, may_be_contradicted = false;

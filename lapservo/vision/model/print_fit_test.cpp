@@ -87,6 +87,29 @@ TEST(PrintFit, WhatHidesABoundaryLeavesPsiInDoubtUnlessThePrintWasMeasured) {
     });
 }
 
+// A frame that shows enough is fitted without it; another is held at it all the same.
+TEST(PrintFit, AnRcmThatTheImageMissesIsNamedWhereItHoldsTheShaft) {
+  scenes::for_each_shot(shots, [](const Shot& shot) {
+    const Scene scene = shot.sight.scene();
+    const PoseUnknowns truth = shot.truth(true);
+    const EdgeBlur lens;
+    const EdgeMeasurements edges = measure_edges(scene, shot.sight.light(), truth, film_mean_m, {2, 0, 1, 1}, lens);
+    const CommonErrors errors = common_errors(edges, lens, std::nullopt, {}, {});
+    const Eigen::Vector3d aside = truth.pose().camera_from_unrolled.rotation * Eigen::Vector3d::UnitX();
+    for (const double off_m : {0.0, 0.05})
+      for (const bool is_well_seen : {true, false}) {
+        RcmPrior registration = *scene.registration;
+        registration.camera_from_rcm.translation += off_m * aside;
+        auto measurements = edges.all;
+        const RcmBesideFit rcm{registration.of(truth.pose(), fine_fit_limits.least_rcm_sigma_m), true, is_well_seen};
+        const auto fit = fit_print(measurements, rcm, 0, scene.marker, false, errors);
+        ASSERT_TRUE(fit);
+        EXPECT_EQ(fit->misses_rcm, off_m > 0) << is_well_seen;
+        EXPECT_EQ(fit->through_rcm, !(fit->misses_rcm && is_well_seen)) << off_m;
+      }
+  });
+}
+
 TEST(PrintFit, TheTolerancesShareOfPsisVarianceGrowsWithIt) {
   const Shot& shot = scenes::usual_shot(1);
   Marker marker = shot.rig.instruments[0].marker;
