@@ -68,13 +68,12 @@ TurnBlur turn_blur(const EdgeMeasurements& pass, const EdgeBlur& located_with, b
 }
 
 double variance_of_uneven_turn(const TurnBlur& blur, std::optional<double> change_rad) {
-  if (!(blur.sigma_rad2 > 0)) return 0;
+  // A start from rest within the exposure is off by a fourth of how far psi has come.
+  const double most_rad = turn_blur_limits.uneven_of_change * change_rad.value_or(0), from_rest_rad = most_rad / 2;
+  if (!(blur.sigma_rad2 > 0)) return from_rest_rad * from_rest_rad;
   if (!(blur.variance_rad2 > turn_blur_limits.told_sigmas * blur.sigma_rad2)) return 0;
   const double told = square_of_uneven * blur.variance_rad2;
-  if (!change_rad) return told;
-  // A start from rest within the exposure is off by a fourth of how far psi has come.
-  const double most_rad = turn_blur_limits.uneven_of_change * *change_rad;
-  return std::min(told, most_rad * most_rad);
+  return change_rad ? std::min(told, most_rad * most_rad) : told;
 }
 
 }  // namespace lapservo::internal

@@ -36,7 +36,8 @@ TurnBlur turn_blur(const EdgeMeasurements& pass, const EdgeBlur& located_with, b
 /// Variance of psi in the exposure's middle about its mean over the exposure, which is what an image shows. Psi may
 /// have turned evenly, which moves nothing, but the blur does not show that; it is taken for a start from rest. Most
 /// single frames are still: a blur that may be noise does not count. By `change_rad` psi's step from the frame before
-/// differs from that before, which bounds it.
+/// differs from that before, which bounds it; where the blur says nothing, it is that of a start from rest that changes
+/// psi so far, and 0 of a frame on its own.
 double variance_of_uneven_turn(const TurnBlur& blur, std::optional<double> change_rad);
 
 }  // namespace lapservo::internal

@@ -72,11 +72,15 @@ TEST(TurnBlur, DoubtsWhatIsNoTurn) {
   EXPECT_LT(of({0, 0.05, 0.2, 0}, 1.5), 0.1 * turn) << "motion across the shaft";
 }
 
-TEST(TurnBlur, TellsNothingWithoutBothInnerBoundariesAndAnEnd) {
+// A frame whose psi is where an even turn would have it, did not turn unevenly either.
+TEST(TurnBlur, LeavesTheChangeOfPsiToTellWithoutBothInnerBoundariesAndAnEnd) {
+  constexpr double turn_rad = 0.1;
   for (const std::vector<std::size_t>& hidden : {std::vector<std::size_t>{0, 3}, {1}, {2}}) {
     const TurnBlur blur = turn_blur(boundaries_blurred_by({0, 0.05, 0.2, 0}, hidden), lens(), false);
     EXPECT_EQ(blur.sigma_rad2, 0) << hidden[0];
-    EXPECT_EQ(variance_of_uneven_turn(blur, 0.1), 0) << hidden[0];
+    EXPECT_NEAR(std::sqrt(variance_of_uneven_turn(blur, turn_rad / 3)), turn_rad / 12, 1e-9) << hidden[0];
+    for (const std::optional<double> change_rad : {std::optional<double>(), std::optional(0.0)})
+      EXPECT_EQ(variance_of_uneven_turn(blur, change_rad), 0) << hidden[0];
   }
 }
 
