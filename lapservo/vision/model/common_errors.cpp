@@ -169,7 +169,7 @@ RigErrors::RigErrors(const Camera& camera, const Marker& marker, const ShaftPose
                lower = measured ? common_part(marker.bands_lower_m, *sigmas.bands_lower_m) : 0,
                wrap_m = sigmas.wrap_m.value_or(0), gap_rad = sigmas.gap_rad.value_or(0),
                wider = sigmas.diameter_m.value_or(0) / marker.diameter_m;
-  // A thicker shaft looks like a nearer one whose print is shorter.
+  // A thicker shaft looks like a nearer one whose print is shorter, unless that was measured in diameters.
   const Rigid3& placed = pose.camera_from_unrolled;
   nearer_m_ = wider * (placed.rotation.conjugate() * placed.translation);
   const std::array<double, 4> upper_m = boundaries_m(marker, 0), slopes_m = boundary_slopes_m(marker);
@@ -178,7 +178,7 @@ RigErrors::RigErrors(const Camera& camera, const Marker& marker, const ShaftPose
     along_m_[0][k] = {upper * upper_m[k], lower * (lower_m - marker.wrap_m)};
     along_m_[1][k] = {0, wrap_m};
     along_m_[2][k] = {0, gap_rad * slopes_m[k]};
-    along_m_[3][k] = {wider * upper_m[k], wider * lower_m};
+    along_m_[3][k] = (measured ? 0 : wider) * Eigen::Vector2d(upper_m[k], lower_m);
   }
   // One sigma of the exponent by which light may be off: v^(1 + x) differs from v by x v ln(v), by 0.28 x at most
   // beside what another exposure makes of it.

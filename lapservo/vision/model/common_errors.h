@@ -79,7 +79,8 @@ inline constexpr UsualErrors usual_errors;
 /// measurements [px], to first order. Numbers count as independent of one another, but for the two focal lengths, a
 /// third of whose variance is common: a camera's mostly have all of it in common, but the rig does not say. The errors
 /// of a print's bands have most in common: they count as one of its length, beside what they leave of each boundary
-/// (Marker::boundary_sigma_m()).
+/// (Marker::boundary_sigma_m()). Images show lengths in diameters, and so a measured print is known: its lengths err
+/// with the diameter, beside their own sigmas. Those of another one are known in metres.
 class RigErrors {
  public:
   static constexpr int of_marker = 4, most = 5 + 5 + 1 + of_marker;  ///< pinhole, distortion, response, marker

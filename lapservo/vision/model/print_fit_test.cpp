@@ -110,6 +110,33 @@ TEST(PrintFit, AnRcmThatTheImageMissesIsNamedWhereItHoldsTheShaft) {
   });
 }
 
+// All that an image shows of a shaft and a print in diameters it shows of larger ones farther away.
+TEST(PrintFit, TheDiameterOfAMeasuredPrintMakesNothingUncertainButThePlace) {
+  scenes::for_each_shot(shots, [](const Shot& shot) {
+    constexpr double wider = 5e-3;
+    const PoseUnknowns truth = shot.truth(false);
+    const EdgeBlur lens;
+    const EdgeMeasurements edges =
+        measure_edges(shot.sight.scene(), shot.sight.light(), truth, film_mean_m, {2, 0, 1, 1}, lens);
+    Marker marker = measured(shot.rig.instruments[0].marker, 1e-5);
+    const auto covariance = [&]() -> PoseMatrix {
+      auto measurements = edges.all;
+      CommonErrors errors = common_errors(edges, lens, std::nullopt, {}, {});
+      errors.rig = RigErrors(shot.rig.camera, marker, truth.pose(), {});
+      return fit_print(measurements, std::nullopt, 0, marker, false, errors).value().covariance;
+    };
+    const PoseMatrix of_exact = covariance();
+    marker.sigmas.diameter_m = wider * marker.diameter_m;
+    const PoseMatrix of_measured = covariance();
+    const Rigid3& placed = truth.pose().camera_from_unrolled;
+    PoseVector scaled = PoseVector::Zero();
+    scaled.segment<3>(2) = wider * (placed.rotation.conjugate() * placed.translation);
+    const PoseVector per_sigma = of_measured.diagonal().cwiseSqrt().cwiseInverse();
+    const PoseMatrix off = of_measured - of_exact - scaled * scaled.transpose();
+    EXPECT_LT((per_sigma.asDiagonal() * off * per_sigma.asDiagonal()).cwiseAbs().maxCoeff(), 0.01);
+  });
+}
+
 TEST(PrintFit, TheTolerancesShareOfPsisVarianceGrowsWithIt) {
   const Shot& shot = scenes::usual_shot(1);
   Marker marker = shot.rig.instruments[0].marker;
