@@ -19,10 +19,22 @@ namespace lapservo::internal {
 namespace {
 
 constexpr std::size_t min_seam_frames = 8;
+// A seam and psi's offset are one number: as well known as a registration's rotation has to be.
+constexpr double max_sigma_seam_rad = 0.02;
+// One sigma, about 0, of a delay that the rig lacks: that of usual cameras.
+constexpr double unknown_delay_s = 0.3;
 
 // Where the recording has that time.
 double psi_at(const JointRecording& recording, const Joints& joints, double time_s) {
   return q_from_joints(joints, Eigen::Vector4d(recording.at(time_s).value().data()))[3];
+}
+
+// How fast the joint turns psi.
+double rate_at(const JointRecording& recording, const Joints& joints, double time_s) {
+  constexpr double around_s = 0.05;
+  const double from_s = recording.at(time_s - around_s) ? time_s - around_s : time_s,
+               to_s = recording.at(time_s + around_s) ? time_s + around_s : time_s;
+  return from_s < to_s ? (psi_at(recording, joints, to_s) - psi_at(recording, joints, from_s)) / (to_s - from_s) : 0;
 }
 
 // psi in the RCM's azimuths of a shaft in a free pose: its axis as theta and phi have it, its turn about that.
@@ -107,7 +119,7 @@ SeamRegistration register_seam(const Instrument& instrument, const MarkerCalibra
                                const JointRecording& recording) {
   SeamRegistration result;
   const Marker& marker = calibration.marker;
-  std::vector<double> times_s, seen_rad;
+  std::vector<double> times_s, seen_rad, rates;
   double first_s = 1e300, last_s = -1e300;
   for (const KeyFrame& frame : calibration.key_frames) {
     const double time_s = frame.time_s - instrument.image_delay_s.value_or(0);
@@ -115,6 +127,7 @@ SeamRegistration register_seam(const Instrument& instrument, const MarkerCalibra
     if (!recording.at(time_s)) continue;
     times_s.push_back(time_s);
     seen_rad.push_back(psi_of(frame.sighting.unknowns.pose(), instrument.camera_from_rcm.value()));
+    rates.push_back(rate_at(recording, instrument.joints.value(), time_s));
   }
   result.frames = times_s.size();
   if (times_s.size() < min_seam_frames) {
@@ -125,32 +138,35 @@ SeamRegistration register_seam(const Instrument& instrument, const MarkerCalibra
     return result;
   }
   const JointRecording readings = refined(recording, 5e-3);
-  const auto differences = [&](double about_rad, double gap_rad) {
+  const auto differences = [&](double about_rad, double gap_rad, double later_s) {
     JointRecording behind = readings;
     put_behind_gap(behind, 3, gap_rad);
     std::vector<double> all;
     for (std::size_t i = 0; i < times_s.size(); ++i)
-      all.push_back(wrap_pi(seen_rad[i] - psi_at(behind, instrument.joints.value(), times_s[i]) - about_rad));
+      all.push_back(wrap_pi(seen_rad[i] - psi_at(behind, instrument.joints.value(), times_s[i]) + rates[i] * later_s -
+                            about_rad));
     return all;
   };
-  // About the direction of most, then the median, then with the gap.
+  // About the direction of most, then the median, then with the gap and the delay.
   double sine = 0, cosine = 0;
-  for (const double d : differences(0, 0)) sine += std::sin(d), cosine += std::cos(d);
+  for (const double d : differences(0, 0, 0)) sine += std::sin(d), cosine += std::cos(d);
   const double direction_rad = std::atan2(sine, cosine);
-  const double about_rad = direction_rad + median(differences(direction_rad, 0));
-  constexpr double widest_rad = 0.2, step_rad = 1e-4, unit_rad = 1e-3;
+  const double about_rad = direction_rad + median(differences(direction_rad, 0, 0));
+  constexpr double widest_rad = 0.2, step_rad = 1e-4, step_s = 1e-4, unit_rad = 1e-3, exact_s = 1e-6;
   // The middle of the gap is where registration has the joints' offset. A turn one way leaves the gap open: gaps of up
   // to 40 mrad are usual (docs/statuses.md).
   const double gap_sigma_rad = 0.04 / std::sqrt(3.0);
-  std::optional<FrameFit> fit;
-  if (robust_scale(differences(about_rad, 0)) < widest_rad)
-    fit = fit_frames(
-        [&](const Eigen::VectorXd& x) -> Eigen::MatrixXd {
-          const std::vector<double> off_rad = differences(about_rad + x[0], x[1]);
-          return Eigen::RowVectorXd::Map(off_rad.data(), static_cast<Eigen::Index>(off_rad.size())) / unit_rad;
-        },
-        {{0, step_rad}, {0, step_rad, gap_sigma_rad}}, 1);
-  if (!fit) {
+  // The same holds for what the delay is off by: there and back it shows, as a gap does, one way it moves the seam.
+  const double delay_sigma_s =
+      instrument.image_delay_s ? std::max(exact_s, instrument.sigma_image_delay_s.value_or(exact_s)) : unknown_delay_s;
+  const std::optional<FrameFit> fit = fit_frames(
+      [&](const Eigen::VectorXd& x) -> Eigen::MatrixXd {
+        const std::vector<double> off_rad = differences(about_rad + x[0], x[1], x[2]);
+        return Eigen::RowVectorXd::Map(off_rad.data(), static_cast<Eigen::Index>(off_rad.size())) / unit_rad;
+      },
+      {{0, step_rad}, {0, step_rad, gap_sigma_rad}, {0, step_s, delay_sigma_s}}, 1);
+  const Eigen::RowVectorXd sizes = fit ? Eigen::RowVectorXd(fit->residuals.row(0).cwiseAbs()) : Eigen::RowVectorXd();
+  if (!fit || unit_rad * rms_but_tenth({sizes.begin(), sizes.end()}) > widest_rad) {
     result.refusal =
         "the joints do not turn as the marker does: check joints.sign, the recording's clock and image_delay_s";
     return result;
@@ -158,6 +174,12 @@ SeamRegistration register_seam(const Instrument& instrument, const MarkerCalibra
   // A pose was found with marker.seam_rad: what psi is too large by, the seam lies farther.
   result.seam_rad = wrap_pi(marker.seam_rad + about_rad + fit->x[0]);
   result.sigma_rad = std::sqrt(covariance_at_least(fit->covariance, fit->independent)(0, 0));
+  if (result.sigma_rad > max_sigma_seam_rad)
+    result.refusal = fmt::format(
+        "the seam would be known to {:.0f} mrad only, expected {:.0f} or less{}: turn the instrument there and "
+        "back, or measure image_delay_s of these recordings by lapservo align",
+        1e3 * result.sigma_rad, 1e3 * max_sigma_seam_rad,
+        instrument.image_delay_s ? "" : ", as the rig has no image_delay_s and the turn does not show it");
   return result;
 }
 

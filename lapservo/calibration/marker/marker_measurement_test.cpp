@@ -1,6 +1,7 @@
 #include "lapservo/calibration/marker/marker_measurement.h"
 
 #include <cmath>
+#include <optional>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -80,6 +81,23 @@ TEST(RegisterSeam, ItsSigmaHoldsTheGapThatATurnOneWayDoesNotShow) {
   ASSERT_EQ(seam.refusal, "");
   EXPECT_NEAR(seam.seam_rad, wrap_pi(turn.calibration.marker.seam_rad + 0.4), 2 * seam.sigma_rad);
   EXPECT_NEAR(seam.sigma_rad, 0.02 / std::sqrt(3.0), 1e-3);
+}
+
+// Frames are stamped 0.2 s late.
+TEST(RegisterSeam, NeedsTheDelayOfATurnOneWayAlone) {
+  for (const auto delay_s : {std::optional<double>(), std::optional(0.05)}) {
+    Turn both_ways(0.4, 1e-3, 0, true);
+    both_ways.instrument.image_delay_s = delay_s;
+    const auto seam = seam_of(both_ways);
+    ASSERT_EQ(seam.refusal, "");
+    EXPECT_NEAR(seam.seam_rad, wrap_pi(both_ways.calibration.marker.seam_rad + 0.4), 5e-4);
+    EXPECT_LT(seam.sigma_rad, 3e-4);
+  }
+  Turn one_way(0.4, 1e-3);
+  one_way.instrument.sigma_image_delay_s = 0.02;
+  EXPECT_NEAR(seam_of(one_way).sigma_rad, std::hypot(0.02 / std::sqrt(3.0), 0.02 * two_pi / 20), 1e-3);
+  one_way.instrument.image_delay_s.reset(), one_way.instrument.sigma_image_delay_s.reset();
+  EXPECT_TRUE(has(seam_of(one_way).refusal, "the rig has no image_delay_s"));
 }
 
 TEST(RegisterSeam, RefusesRecordingsOfOtherTimesAndOtherTurns) {
