@@ -1,5 +1,6 @@
 #include "lapservo/calibration/check/rig_check.h"
 
+#include <array>
 #include <cmath>
 #include <string>
 #include <utility>
@@ -135,6 +136,23 @@ TEST(RigEvidence, IsTheSameFromOneCoreAndFromTwo) {
   ASSERT_FALSE(keys_of_one.empty());
   for (std::size_t i = 0; i < keys_of_one.size(); ++i)
     EXPECT_EQ(keys_of_one[i].sighting.tau_rad, keys_of_two[i].sighting.tau_rad);
+}
+
+// All frames share what the rig's sigmas say: it is no noise of a pose.
+TEST(RigEvidence, ItsPosesHaveTheSigmasOfTheirFrames) {
+  Rig measured = true_rig();
+  Marker& marker = measured.instruments[0].marker;
+  marker.sigmas.bands_upper_m = marker.sigmas.bands_lower_m = std::array{1e-5, 1e-5, 1e-5};
+  marker.sigmas.diameter_m = 2e-5, marker.tolerance_m = 1e-5;
+  measured.camera.sigmas.fx_px = measured.camera.sigmas.fy_px = 3, measured.camera.response.sigma = 0.01;
+  RigEvidence exact(true_rig(), 0), evidence(measured, 0);
+  for (const cv::Mat& picture : rendered(4, {})) exact.add(picture, 0), evidence.add(picture, 0);
+  ASSERT_EQ(evidence.poses().size(), 4U);
+  ASSERT_EQ(exact.poses().size(), 4U);
+  for (std::size_t i = 0; i < 4; ++i) {
+    EXPECT_EQ(evidence.poses()[i].marker.sigma_roll_rad, exact.poses()[i].marker.sigma_roll_rad);
+    EXPECT_EQ(evidence.poses()[i].marker.sigma_z_m, exact.poses()[i].marker.sigma_z_m);
+  }
 }
 
 // An exception of both halves reaches the caller once, wherever they ran.

@@ -12,12 +12,15 @@ namespace {
 // Where the print is off: it is not to hide what else is wrong.
 constexpr double print_tolerance_m = 0.1e-3;
 
-// Without a registration that bends poses.
+// Without a registration that bends poses, and without what the rig says of errors that all frames share: as noise of
+// each frame they would hide what else is wrong. A tolerance of 0 is exact, a larger one at least the rig's.
 Rig free_rig(Rig rig, double tolerance_m, double focal_change) {
   for (Instrument& instrument : rig.instruments) {
     instrument.camera_from_rcm.reset();
-    instrument.marker.tolerance_m = std::max(instrument.marker.tolerance_m, tolerance_m);
+    instrument.marker.tolerance_m = tolerance_m > 0 ? std::max(instrument.marker.tolerance_m, tolerance_m) : 0;
+    instrument.marker.sigmas = {};
   }
+  rig.camera.sigmas = {}, rig.camera.response.sigma.reset();
   rig.camera.fx_px *= 1 + focal_change, rig.camera.fy_px *= 1 + focal_change;
   return rig;
 }

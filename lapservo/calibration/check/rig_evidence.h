@@ -42,7 +42,8 @@ class RigEvidence {
 
   // These functions wait for all frames that were added.
   const std::vector<FrameEvidence>& frames() const { return finish_all_but(0), frames_; }
-  /// By the image alone, whatever the print; with TimedPose::by_focal.
+  /// By the image alone, whatever the print; with TimedPose::by_focal. Their sigmas are each frame's own: the rig's
+  /// sigmas, which all frames share, are not in them.
   const std::vector<TimedPose>& poses() const { return finish_all_but(0), poses_; }
   std::vector<TrackedPsi> tracked_psi() const;
   /// Nullopt when the marker's edges are too few.
@@ -54,7 +55,8 @@ class RigEvidence {
 
  private:
   static constexpr double focal_step = 0.01;
-  // By the image alone, with the rig's focal length, with one that is longer and with one that is shorter.
+  // By the image alone and without the rig's sigmas, with the rig's focal length, with one that is longer and with one
+  // that is shorter.
   struct FreeTrackers {
     FreeTrackers(const Rig& rig, double tolerance_m);
     Tracker at, longer, shorter;
