@@ -25,9 +25,9 @@ namespace {
 
 constexpr auto no_frame = "no frame came: see whether the source sends images";
 constexpr std::size_t most_kept = 3;
-constexpr int least_missed = 5;       // frames that contradict the rig's RCM before that is reported
-constexpr double grey_range = 12;     // of 255: largest minus smallest channel, sensor noise included
-constexpr double pixel_share = 0.99;  // of a frame's pixels that are grey
+constexpr std::size_t least_missed = 5;  // frames that contradict the rig's RCM before that is reported
+constexpr double grey_range = 12;        // of 255: largest minus smallest channel, sensor noise included
+constexpr double pixel_share = 0.99;     // of a frame's pixels that are grey
 
 bool is_grey(const cv::Mat& bgr) {
   std::vector<cv::Mat> channels;
@@ -243,6 +243,22 @@ const char* usual_cause(Status status) {
   return "";
 }
 
+void MissedRcm::add_missed(const Observation::MarkerPose& marker, const Eigen::Vector3d& rcm_m) {
+  const TimedPose pose{0, marker};
+  misses_m.push_back(pose.miss_m(rcm_m));
+  reversed += pose.beyond_m(rcm_m) < 0 ? 1 : 0;
+}
+
+bool MissedRcm::is_wrong() const {
+  return misses_m.size() >= least_missed && 2 * misses_m.size() > static_cast<std::size_t>(shown);
+}
+
+std::string MissedRcm::text() const {
+  if (is_reversed()) return fmt::format("in {} of {} frames {}", reversed, shown, reversed_marker);
+  return fmt::format("in {} of {} frames {}, by {:.1f} mm (median)", misses_m.size(), shown, misses_rcm_text,
+                     misses_m.empty() ? 0 : 1000 * median(std::vector(misses_m)));
+}
+
 void FrameDiagnosis::add(const cv::Mat& bgr, const std::vector<Observation>& observations) {
   ++frames_;
   const auto any = [&](Status status) { return std::ranges::count(observations, status, &Observation::status) > 0; };
@@ -259,14 +275,11 @@ void FrameDiagnosis::add(const cv::Mat& bgr, const std::vector<Observation>& obs
       ++seen.refused[observation.status];
       continue;
     }
-    ++seen.ok;
-    seen.with_q += observation.rcm ? 1 : 0;
+    ++seen.missed.shown;
     const auto& camera_from_rcm = rig_.instruments[i].camera_from_rcm;
     any_result |= observation.rcm || !camera_from_rcm;
     if (!camera_from_rcm || observation.rcm || !observation.marker) continue;
-    const TimedPose pose{0, *observation.marker};
-    seen.misses_m.push_back(pose.miss_m(camera_from_rcm->translation));
-    seen.reversed += pose.beyond_m(camera_from_rcm->translation) < 0 ? 1 : 0;
+    seen.missed.add_missed(*observation.marker, camera_from_rcm->translation);
   }
   interlaced_ += any(Status::interlaced) ? 1 : 0;
   blended_ += any(Status::blended) ? 1 : 0;
@@ -333,17 +346,15 @@ std::string FrameDiagnosis::cause_in_frames(bool found_nowhere) const {
 
 std::string FrameDiagnosis::text_of_missed_rcm() const {
   for (const auto& [name, seen] : seen_) {
-    if (static_cast<int>(seen.misses_m.size()) < least_missed || 2 * seen.with_q >= seen.ok) continue;
+    if (!seen.missed.is_wrong()) continue;
     if (OtherReadings(kept_, rig_, deinterlaced_).shows_q_when_turned())
       return fmt::format(
           "{}: the shaft passes the rig's RCM when the image is turned by 180 degrees: turn the camera as it was when "
           "camera_from_rcm was measured, or measure it anew by lapservo calibrate registration",
           name);
-    if (2 * static_cast<std::size_t>(seen.reversed) > seen.misses_m.size())
-      return fmt::format("{}: in {} of {} frames {}", name, seen.reversed, seen.ok, reversed_marker);
+    if (seen.missed.is_reversed()) return fmt::format("{}: {}", name, seen.missed.text());
     return fmt::format(
-        "{}: in {} of {} frames {}, by {:.1f} mm (median): {}{}", name, seen.misses_m.size(), seen.ok, misses_rcm_text,
-        1000 * median(std::vector(seen.misses_m)), measure_registration_text,
+        "{}: {}: {}{}", name, seen.missed.text(), measure_registration_text,
         rig_.camera.distorted()
             ? "; images that are already undistorted (image_rect) need a rig without distortion_coefficients"
             : "");

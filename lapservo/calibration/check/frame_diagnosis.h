@@ -1,9 +1,11 @@
 #pragma once
 
+#include <cstddef>
 #include <map>
 #include <string>
 #include <vector>
 
+#include <Eigen/Core>
 #include <opencv2/core.hpp>
 
 #include "lapservo/rig/rig.h"
@@ -20,6 +22,20 @@ const char* usual_cause(Status status);
 constexpr bool comes_by_compression(Status status) {
   return status == Status::poor_fit || status == Status::uncertain || status == Status::ambiguous;
 }
+
+/// Of frames that show an instrument, those whose shaft misses the rig's RCM.
+struct MissedRcm {
+  int shown = 0;                 ///< frames that show it
+  std::vector<double> misses_m;  ///< distances of the shaft's axis from the RCM, where it misses it
+  int reversed = 0;              ///< of them, those whose marker points back to the RCM
+
+  void add_missed(const Observation::MarkerPose& marker, const Eigen::Vector3d& rcm_m);
+  /// Whether the rig's RCM is wrong: more than half of the frames miss it, and at least five.
+  bool is_wrong() const;
+  /// Whether it is the marker that is wrong.
+  bool is_reversed() const { return 2 * static_cast<std::size_t>(reversed) > misses_m.size(); }
+  std::string text() const;  ///< "in N of M frames ..."
+};
 
 /// Why frames of a recording are damaged, show no instrument of a rig, or an instrument that misses the rig's RCM.
 /// Frames are added as they are tracked; a few of those without a result are kept and read otherwise when text() or
@@ -42,10 +58,8 @@ class FrameDiagnosis {
 
  private:
   struct Seen {
-    int ok = 0, with_q = 0;
     std::map<Status, int> refused;
-    std::vector<double> misses_m;  ///< distances of the shaft's axis from the rig's RCM, where q is missing
-    int reversed = 0;              ///< of them, those whose marker points back to the RCM
+    MissedRcm missed;  ///< where q is missing
   };
   void keep(const cv::Mat& bgr);
   std::string cause_in_frames(bool found_nowhere) const;

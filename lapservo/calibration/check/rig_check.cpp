@@ -62,12 +62,15 @@ class Advisor {
 
   std::vector<Advice> all() {
     light(), colours(), compression(), response(), camera(), print(), movement(), joints(), delay(), registration();
-    view(), found();
+    missed_rcm(), view(), found();
     std::ranges::stable_sort(advice_, std::greater{}, &Advice::needed);
     return std::move(advice_);
   }
 
  private:
+  static constexpr auto calibrate_registration = "lapservo calibrate registration",
+                        mount_anew = "mount the marker anew";
+
   void add(bool needed, std::string what, std::string command, std::string gain) {
     advice_.push_back({needed, std::move(what), std::move(command), std::move(gain)});
   }
@@ -210,7 +213,7 @@ class Advisor {
   }
 
   void registration() {
-    constexpr auto command = "lapservo calibrate registration";
+    constexpr auto command = calibrate_registration;
     if (f_.arm && !f_.arm->refusal.empty())
       add(true, "joints and images can't be compared: " + f_.arm->refusal,
           "mend that; where it was the recording, record the marker and the joints again; then lapservo check",
@@ -245,16 +248,31 @@ class Advisor {
     if (!f_.rcm) return;
     if (!f_.rcm->refusal.empty())
       add(f_.rcm->refusal == reversed_marker, "whether the RCM is right is unknown: " + f_.rcm->refusal,
-          f_.rcm->refusal == reversed_marker ? "mount the marker anew" : "record a swing, then lapservo check",
+          f_.rcm->refusal == reversed_marker ? mount_anew : "record a swing, then lapservo check",
           "an RCM that is off bends every pose");
     else if (f_.rcm->distance_m && f_.rcm->distance_m->exceeds(2 * rig_limits.place_m))
       add(true,
           fmt::format("the axes meet {:.1f} mm from the rig's RCM (sigma {:.1f} mm)", 1e3 * f_.rcm->distance_m->value,
                       1e3 * f_.rcm->distance_m->sigma),
           std::string(command) + " --joints", "poses that the RCM does not bend");
+    else if (f_.rcm->distance_m && f_.rcm->distance_m->sigma > 2 * rig_limits.place_m)
+      add(true,
+          fmt::format("this recording does not show whether the rig's RCM is right: it places the RCM to {:.1f} mm, "
+                      "one sigma: {}",
+                      1e3 * f_.rcm->distance_m->sigma, swing_more),
+          "record a longer swing, or the joints too; then lapservo check", "whether the RCM is right");
     if (!f_.has_joints)
       add(false, "delay, focal length and the joints' offsets are unknown without the joints",
           "lapservo check --joints", "the same page with them");
+  }
+
+  // Where nothing above says so.
+  void missed_rcm() {
+    if (!f_.missed_rcm.is_wrong()) return;
+    const std::string command = f_.missed_rcm.is_reversed() ? mount_anew : calibrate_registration;
+    if (std::ranges::any_of(advice_, [&](const Advice& a) { return a.needed && a.command.starts_with(command); }))
+      return;
+    add(true, f_.missed_rcm.text(), command, "theta, phi, rho and psi, which these frames lack");
   }
 
   // Without any reason above.
@@ -335,6 +353,11 @@ RigFindings findings_of(const Rig& rig, std::size_t instrument, const RigEvidenc
   findings.response = evidence.response();
   findings.response_measured = rig.camera.response.sigma.has_value();
   findings.registered = of.camera_from_rcm.has_value();
+  for (const FrameEvidence& frame : frames) {
+    if (!findings.registered || frame.status != Status::ok) continue;
+    ++findings.missed_rcm.shown;
+    if (!frame.psi_rad && frame.marker) findings.missed_rcm.add_missed(*frame.marker, of.camera_from_rcm->translation);
+  }
   return findings;
 }
 

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "lapservo/calibration/check/arm_check.h"
+#include "lapservo/calibration/check/frame_diagnosis.h"
 #include "lapservo/calibration/check/rig_evidence.h"
 #include "lapservo/calibration/marker/marker_calibration.h"
 #include "lapservo/rig/rig.h"
@@ -74,6 +75,7 @@ struct RigFindings {
   std::optional<ArmCheck> arm;  ///< with joints
   std::optional<RcmCheck> rcm;  ///< without
   bool registered = false;      ///< the rig has camera_from_rcm
+  MissedRcm missed_rcm;         ///< of a registered rig: frames that are ok, and without q
   bool has_joints = false;      ///< of the recording
   std::optional<WorkSpace> work_space;
 };

@@ -259,6 +259,16 @@ TEST_F(CheckRig, WithoutJointsComparesTheRcm) {
   RigFindings findings = findings_of(rig, 0, evidence);
   findings.rcm = check_rcm(instrument, evidence.poses());
   expect_first(findings, "axes meet");
+  findings.rcm->distance_m = Told{1.8e-3, 2.15e-3};
+  expect_first(findings, "does not show whether the rig's RCM is right");
+}
+
+// Too few for the axes' meeting point, and each of them shows it.
+TEST_F(CheckRig, CallsNoRigGoodWhoseRcmMostFramesMiss) {
+  const std::vector<cv::Mat> few = rendered(8, {});
+  EXPECT_FALSE(found_out(rig, few, joints).missed_rcm.is_wrong());
+  instrument.camera_from_rcm->translation += Eigen::Vector3d(4e-3, 4e-3, 0);  // across the shaft
+  expect_first(found_out(rig, few, joints), "in 8 of 8 frames the shaft misses the rig's RCM");
 }
 
 }  // namespace
