@@ -310,9 +310,7 @@ PrintDepartures departures_at(ceres::Problem& problem, const std::vector<ViewMea
   PrintDepartures result;
   result.faults = seen_of(departures, possible);
   // Clean turns show some of hundredths of a millimetre; the covariance counts them.
-  std::erase_if(result.faults, [](const PrintFault& fault) {
-    return fault.kind == PrintFault::Kind::slips && std::abs(fault.size) < least_edge_m;
-  });
+  std::erase_if(result.faults, [](const PrintFault& fault) { return std::abs(fault.size) < least_edge_m; });
   if (departures.seen.empty()) return result;
   result.covariance = numbers.part_of(departures.by_seen + departures.by_instead, {print.begin(), print.end()});
   return result;

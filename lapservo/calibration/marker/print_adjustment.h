@@ -38,7 +38,7 @@ MarkerSigmas sigmas_of(const PrintCovariance& covariance, MarkerSigmas others);
 /// that leaves tau on the centre line as uncertain as the covariance does, over the roll.
 double tolerance_of(const PrintShape& shape, const PrintCovariance& covariance, const Marker& marker);
 
-/// An edge of a print that lies off by less than this is where it should be: no gap, no slip.
+/// An edge of a print that lies off by less than this is where it should be: no gap, no slip, no bow.
 inline constexpr double least_edge_m = 0.04e-3;
 
 /// A fault that the model of one print with straight edges leaves out.

@@ -75,21 +75,24 @@ TEST_F(SeamLag, IsTakenOffWhereTheTurnGoesBothWays) {
   EXPECT_LT(both_m, 0.15 * one_m);
 }
 
-// That the lower edge lies elsewhere in the second half.
-TEST_F(SeamLag, IsNoSlipAndASmallSlipIsNone) {
-  for (const double slip_m : {0.02e-3, 0.1e-3}) {
-    auto views = passing(seen(), 0, true);
-    for (std::size_t i = 0; i < views.size(); ++i) {
-      views[i].time_s = static_cast<double>(i);
-      for (Measurement& m : views[i].edges.all)
-        if (m.group < 4 && 2 * i >= views.size()) m.residual_px += slip_m * m.turn_fraction * m.along_px_per_m;
+// That the lower edge lies elsewhere in the second half, or that e1 is curved.
+TEST_F(SeamLag, IsNoFaultAndASmallFaultIsNone) {
+  for (const auto kind : {PrintFault::Kind::slips, PrintFault::Kind::curved})
+    for (const double size_m : {0.02e-3, 0.1e-3}) {
+      auto views = passing(seen(), 0, true);
+      for (std::size_t i = 0; i < views.size(); ++i) {
+        views[i].time_s = static_cast<double>(i);
+        for (Measurement& m : views[i].edges.all) {
+          const double lower = m.turn_fraction, off_px = size_m * m.along_px_per_m;
+          if (kind == PrintFault::Kind::slips && m.group < 4 && 2 * i >= views.size()) m.residual_px += lower * off_px;
+          if (kind == PrintFault::Kind::curved && m.group == 1) m.residual_px += 4 * lower * (1 - lower) * off_px;
+        }
+      }
+      const auto faults = adjust(views, rig.instruments[0].marker, {.with_covariance = true})->faults;
+      EXPECT_EQ(std::any_of(faults.begin(), faults.end(), [=](const PrintFault& fault) { return fault.kind == kind; }),
+                size_m > least_edge_m)
+          << static_cast<int>(kind) << " " << size_m;
     }
-    const auto faults = adjust(views, rig.instruments[0].marker, {.with_covariance = true})->faults;
-    EXPECT_EQ(std::any_of(faults.begin(), faults.end(),
-                          [](const PrintFault& fault) { return fault.kind == PrintFault::Kind::slips; }),
-              slip_m > least_edge_m)
-        << slip_m;
-  }
 }
 
 // As many one way as there and back.
