@@ -162,11 +162,24 @@ TEST(RigSigmas, OfADiameterAndOfAPrintsEdgesAreInThePose) {
   row.q.expect(0.7, 1.3), row.pose.expect(0.7, 1.3);
 }
 
-// A camera whose focal lengths, each by itself, are known to a part, and whose response to so much of its values.
-Rig with_camera(Rig rig, double sigma_focal, double sigma_response, Random& random) {
+// A camera whose focal lengths, each by itself or both alike, are known to a part, and whose response to so much of its
+// values.
+struct CameraKnowledge {
+  double sigma_focal, sigma_response;
+  bool alike = false;
+};
+
+Rig with_camera(Rig rig, const CameraKnowledge& known, Random& random) {
+  const double sigma_response = known.sigma_response;
   Camera& camera = rig.camera;
-  camera.sigmas.fx_px = sigma_focal * camera.fx_px, camera.sigmas.fy_px = sigma_focal * camera.fy_px;
-  camera.fx_px += camera.sigmas.fx_px * random.normal(), camera.fy_px += camera.sigmas.fy_px * random.normal();
+  const Eigen::Vector2d sigmas_px = known.sigma_focal * Eigen::Vector2d(camera.fx_px, camera.fy_px);
+  const double of_x = random.normal(), of_y = known.alike ? of_x : random.normal();
+  camera.sigmas.fx_px = sigmas_px.x(), camera.sigmas.fy_px = sigmas_px.y();
+  if (known.alike) {
+    camera.covariance.emplace().setZero();
+    camera.covariance->topLeftCorner<2, 2>() = sigmas_px * sigmas_px.transpose();
+  }
+  camera.fx_px += sigmas_px.x() * of_x, camera.fy_px += sigmas_px.y() * of_y;
   if (!(sigma_response > 0)) return rig;
   // v^(1 + x) lies 0.28 x beside v at most, but for another exposure.
   camera.response.gamma *= 1 + sigma_response / 0.28 * random.normal();
@@ -178,15 +191,15 @@ Rig with_camera(Rig rig, double sigma_focal, double sigma_response, Random& rand
 TEST(RigSigmas, OfACameraAreInThePose) {
   Rig truth = testing::paper_test_rig();
   truth.camera.response = {Response::Kind::power, 2.2};
-  for (const auto& [sigma_focal, sigma_response] :
-       {std::pair(5e-3, 0.0), std::pair(0.0, 0.02), std::pair(5e-3, 0.02)}) {
-    const Row row = tracked(truth, [focal = sigma_focal, response = sigma_response](const Rig& rig, Random& random) {
-      Rig drawn = with_camera(rig, focal, response, random);
+  for (const CameraKnowledge& known :
+       {CameraKnowledge{5e-3, 0}, {5e-3, 0, true}, {0, 0.02}, {5e-3, 0.02}, {5e-3, 0.02, true}}) {
+    const Row row = tracked(truth, [&](const Rig& rig, Random& random) {
+      Rig drawn = with_camera(rig, known, random);
       drawn.instruments[0].camera_from_rcm.reset();
       return drawn;
     });
-    const std::string name =
-        fmt::format("focal length to {:.1f} %, response {:.2f}", 100 * sigma_focal, sigma_response);
+    const std::string name = fmt::format("focal length to {:.1f} %{}, response {:.2f}", 100 * known.sigma_focal,
+                                         known.alike ? " alike" : "", known.sigma_response);
     row.pose.print(name, row.told, row.frames);
     // Pixels that are not square contradict a print.
     EXPECT_GE(row.told, 0.8 * row.frames) << name;

@@ -50,7 +50,7 @@ TEST(MeasuredRig, HoldsAnotherRegistration) {
   const Instrument moved = registered(known, registration);
   EXPECT_EQ(moved.sigma_quaternion_xyzw, known.sigma_quaternion_xyzw);
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
-  covariance.diagonal().head<3>() << 1e-10, 4.002e-10, 9e-10;
+  covariance.diagonal().head<3>() << 1e-10, 4.0016e-10, 9e-10;
   covariance.bottomRightCorner<3, 3>() = known.registration_covariance->bottomRightCorner<3, 3>();
   EXPECT_EQ(moved.registration_covariance, covariance);
   registration.camera_from_rcm.rotation = expected.camera_from_rcm->rotation;
@@ -65,7 +65,7 @@ TEST(MeasuredRig, HoldsAnotherRegistration) {
   const Instrument measured = registered(before, registration);
   expected.registration_covariance = measured.registration_covariance;
   Eigen::Matrix<double, 6, 1> variances;
-  variances << Eigen::Vector3d::Constant(3.333e-10), Eigen::Vector3d::Constant(4e-8);
+  variances << Eigen::Vector3d::Constant(3.33333e-10), Eigen::Vector3d::Constant(4e-8);
   EXPECT_TRUE(measured.registration_covariance->isApprox(variances.asDiagonal().toDenseMatrix(), 1e-9));
   expected.sigma_quaternion_xyzw = {1e-4, 2e-4, 3e-4, 4e-4};
   expected.joints = registration.arm->joints, expected.joints->sigma_offset = registration.arm->sigma_offset;
@@ -78,8 +78,11 @@ TEST(MeasuredRig, HoldsAnotherCamera) {
   calibration.camera = measured_before().camera;
   calibration.camera.fx_px = 501.25;
   calibration.sigmas.fx_px = 0.12504, calibration.sigmas.red = 1.00004e-5;
+  calibration.covariance.diagonal().setConstant(1.0 / 3);
   Camera expected = calibration.camera;
   expected.sigmas.fx_px = 0.125, expected.sigmas.red = 1e-5;
+  expected.covariance.emplace().setZero();
+  expected.covariance->diagonal().setConstant(0.333333);
   EXPECT_EQ(measured_camera(calibration), expected) << "its response was not measured this time: it stays";
   calibration.response = ResponseFit{};
   calibration.response->sigma = 0.00300004, expected.response.sigma = 0.003;

@@ -83,7 +83,7 @@ TEST(BacklashEstimator, IsNotFooledByAWrongDelayOrModel) {
   }
 }
 
-// Of the widths that are sure enough to count, with each fault, none is off by more than its sigma says.
+// With each fault no width that is sure enough to count is off by more than its sigma says.
 TEST(BacklashEstimator, SigmaHoldsWhereNoBacklashExplainsTheImages) {
   const auto tell = [&](const char* name, double part, const std::function<void(World&, double)>& change) {
     int sure = 0, wrong = 0;

@@ -91,7 +91,7 @@ TEST(DelayEstimator, ErrorsMatchItsSigma) {
   EXPECT_GT(std::sqrt(squares / runs), 0.1);
 }
 
-// Of the delays that were found, with each fault, none is off by more than its sigma says.
+// With each fault no delay that is found is off by more than its sigma says.
 TEST(DelayEstimator, SigmaHoldsWhereNoDelayExplainsTheImages) {
   constexpr std::uint64_t runs = 8;
   const auto tell = [](const char* name, double size, const Scene& departed) {

@@ -44,7 +44,7 @@ double settled_s(const Moments& moments) {
   return last_s;
 }
 
-/// Of the errors from then on.
+/// The errors from then on.
 Eigen::Vector4d rms_after(const Moments& moments, double time_s) {
   Eigen::Vector4d sum = Eigen::Vector4d::Zero();
   int samples = 0;

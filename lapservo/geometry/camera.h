@@ -40,6 +40,9 @@ struct Camera {
   bool deinterlace = false;  ///< its frames are two fields, of two moments
   ChromaticAberration chromatic_aberration = {};
   CameraSigmas sigmas = {};
+  /// That of fx fy cx cy [px] k1 k2 p1 p2 k3. Without it `sigmas` count as independent, but for a third of the focal
+  /// lengths' variance.
+  std::optional<Eigen::Matrix<double, 9, 9>> covariance = {};
 
   bool operator==(const Camera&) const = default;
   bool distorted() const {

@@ -108,7 +108,7 @@ TipGoal tip_goal_of(const PlaceMessage& message, const std::string& camera) {
   refuse_other_frame("tip_goal", message.frame, camera);
   const Eigen::Quaterniond& turn = message.pose.rotation;
   TipGoal goal{message.pose.translation};
-  // What ROS 2 and ROS 1 write where nobody sets it.
+  // ROS 2 and ROS 1 write these where nobody sets it.
   const bool unset = turn.coeffs() == Eigen::Vector4d(0, 0, 0, 1) || turn.coeffs() == Eigen::Vector4d(0, 0, 0, 0);
   if (!unset) {
     if (!(std::abs(turn.norm() - 1) < rounding))

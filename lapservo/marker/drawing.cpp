@@ -34,7 +34,7 @@ cairo_status_t write_to_stream(void* stream, const unsigned char* bytes, unsigne
   return CAIRO_STATUS_SUCCESS;  // the stream reports errors at the end
 }
 
-// What cairo made, which `destroy` frees.
+// An object of cairo, which `destroy` frees.
 template <typename Made, void (*destroy)(Made*)>
 using Owned = std::unique_ptr<Made, std::integral_constant<void (*)(Made*), destroy>>;
 

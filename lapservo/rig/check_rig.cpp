@@ -15,7 +15,8 @@ void check_camera(const Camera& camera) {
       throw InputError("rig", "camera: focal length", std::to_string(focal_px), "above 0 px");
   double sum = camera.cx_px + camera.cy_px;
   for (const double coefficient : camera.distortion) sum += coefficient;
-  if (!std::isfinite(sum)) throw InputError("rig", "camera: centre or distortion", "not finite", "numbers");
+  if (camera.covariance) sum += camera.covariance->sum();
+  if (!std::isfinite(sum)) throw InputError("rig", "camera: centre, distortion or covariance", "not finite", "numbers");
 }
 
 }  // namespace

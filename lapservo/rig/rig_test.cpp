@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <Eigen/Geometry>
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "lapservo/marker/decoder.h"
@@ -317,15 +318,20 @@ TEST(Rig, OfALensThatFoldsInTheCornersAloneIsTaken) {
   EXPECT_TRUE(rig.camera.ideal_from_raw({639.5, 0}));
 }
 
-TEST(Rig, WhoseRegistrationsCovarianceIsNotSymmetricIsRefused) {
-  const auto text = [](const std::string& number) {
-    std::string numbers = "1e-6, " + number;
-    for (int i = 2; i < 36; ++i) numbers += i % 7 == 0 ? ", 1e-6" : i == 6 ? ", 5e-7" : ", 0";
-    return with("    camera_from_rcm:\n",
-                "    camera_from_rcm:\n      covariance: {rows: 6, cols: 6, data: [" + numbers + "]}\n");
-  };
-  EXPECT_EQ(error_of(text("5e-7")), "");
-  EXPECT_NE(error_of(text("4e-7")), "");
+TEST(Rig, WhoseCovarianceIsNotSymmetricIsRefused) {
+  for (const auto& map : {std::pair<std::string, int>("    camera_from_rcm:\n", 6), {"camera:\n", 9}}) {
+    const std::string& place = map.first;
+    const int size = map.second;
+    const auto text = [&](const std::string& number) {
+      std::string numbers = "1e-6, " + number;
+      for (int i = 2; i < size * size; ++i) numbers += i % (size + 1) == 0 ? ", 1e-6" : i == size ? ", 5e-7" : ", 0";
+      const std::string indent(place.find_first_not_of(' ') + 2, ' ');
+      return with(place, fmt::format("{}{}covariance: {{rows: {}, cols: {}, data: [{}]}}\n", place, indent, size, size,
+                                     numbers));
+    };
+    EXPECT_EQ(error_of(text("5e-7")), "") << place;
+    EXPECT_NE(error_of(text("4e-7")), "") << place;
+  }
 }
 
 // Put together in a program.
@@ -341,6 +347,7 @@ TEST(Rig, WithWhichNothingCanBeSeenIsRefused) {
   expect_refused([](Rig& rig) { rig = {}; });
   expect_refused([](Rig& rig) { rig.camera.fx_px = none; });
   expect_refused([](Rig& rig) { rig.camera.distortion[4] = none; });
+  expect_refused([=](Rig& rig) { rig.camera.covariance.emplace().setConstant(none); });
   expect_refused([](Rig& rig) { rig.instruments.clear(); });
   expect_refused([](Rig& rig) { rig.instruments[0].marker.diameter_m = -1; });
   expect_refused([](Rig& rig) { rig.instruments.push_back(rig.instruments[0]); });

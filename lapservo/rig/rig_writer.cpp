@@ -43,6 +43,11 @@ std::string matrix_text(int rows, const Numbers& numbers) {
                      text_of(numbers));
 }
 
+std::string covariance_text(const Eigen::MatrixXd& covariance) {
+  return matrix_text(static_cast<int>(covariance.rows()),
+                     std::vector<double>(covariance.data(), covariance.data() + covariance.size()));
+}
+
 // The fields of Camera and of CameraSigmas.
 template <typename Pinhole>
 std::string pinhole_text(const Pinhole& k, double last) {
@@ -124,7 +129,7 @@ std::string transform_yaml(const Instrument& instrument, int indent) {
   lines.add_measured("translation_m", std::array{t.x(), t.y(), t.z()}, instrument.sigma_translation_m);
   lines.add_measured("quaternion_xyzw", std::array{q.x(), q.y(), q.z(), q.w()}, instrument.sigma_quaternion_xyzw);
   if (const auto& covariance = instrument.registration_covariance)
-    lines.add("covariance", matrix_text(6, std::vector<double>(covariance->data(), covariance->data() + 36)));
+    lines.add("covariance", covariance_text(*covariance));
   return lines.text();
 }
 
@@ -169,9 +174,7 @@ std::string tool_yaml(const Tool& tool, const fs::path& destination, int indent)
   if (!straight) lines.add("azimuth_rad", text_of(tool.place->azimuth_rad));
   if (tool.place->covariance.isZero(0)) return lines.text();
   const Eigen::Index size = straight ? 3 : 4 + static_cast<Eigen::Index>(tool.wrist.size());
-  const Eigen::MatrixXd covariance = tool.place->covariance.topLeftCorner(size, size);
-  lines.add("covariance", matrix_text(static_cast<int>(size),
-                                      std::vector<double>(covariance.data(), covariance.data() + size * size)));
+  lines.add("covariance", covariance_text(tool.place->covariance.topLeftCorner(size, size)));
   return lines.text();
 }
 
@@ -212,6 +215,7 @@ std::string camera_yaml(const Camera& camera, int indent) {
   lines.add("distortion_coefficients", matrix_text(1, camera.distortion));
   if (sigmas.distortion != CameraSigmas{}.distortion)
     lines.add("sigma_distortion_coefficients", matrix_text(1, sigmas.distortion));
+  if (camera.covariance) lines.add("covariance", covariance_text(*camera.covariance));
   lines.add("response", response_text(camera.response));
   if (camera.response.sigma) lines.add("sigma_response", text_of(*camera.response.sigma));
   const bool measured = sigmas.blue != 0 || sigmas.red != 0;

@@ -87,6 +87,14 @@ Response random_response(Random& random) {
   return all.at(random.bits() % all.size());
 }
 
+template <int size>
+Eigen::Matrix<double, size, size> random_covariance(Random& random) {
+  Eigen::Matrix<double, size, size> root;
+  for (double& number : root.reshaped()) number = 1e-3 * random.normal();
+  const Eigen::Matrix<double, size, size> square = root * root.transpose();
+  return (square + square.transpose()) / 2;
+}
+
 TEST(RigWriter, WhatItWritesReadsBackToTheLastBit) {
   Random random(1);
   for (int i = 0; i < 300; ++i) {
@@ -100,10 +108,8 @@ TEST(RigWriter, WhatItWritesReadsBackToTheLastBit) {
     instrument.camera_from_rcm = {
         Eigen::Quaterniond(random.normal(), random.normal(), random.normal(), random.normal()).normalized(),
         {random.uniform(-1, 1), 1.0 / 3, -0.0}};
-    Eigen::Matrix<double, 6, 6> root;
-    for (double& number : root.reshaped()) number = 1e-3 * random.normal();
-    const Eigen::Matrix<double, 6, 6> square = root * root.transpose();
-    instrument.registration_covariance = (square + square.transpose()) / 2;
+    instrument.registration_covariance = random_covariance<6>(random);
+    if (i % 2 != 0) rig.camera.covariance = random_covariance<9>(random);
     instrument.joints->offset = {0, 1.0 / 3, -0.0, random.normal()};
     ASSERT_EQ(written_and_read(rig), rig) << rig_yaml(rig);
   }

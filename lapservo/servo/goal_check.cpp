@@ -32,7 +32,7 @@ struct Reach {
     return centre_line(rig.camera, rig.instruments[0].marker, *camera_from_rcm * rcm_from_unrolled(q), q.psi_rad);
   }
 
-  // Of the turns that hold the tip alike the one to which the features lead from the step before: d jumps where the
+  // The turn to which the features lead from the step before, out of those that hold the tip alike: d jumps where the
   // marker's seam passes the centre line, so the shaft turns the way on which it does not, be it the longer one.
   std::optional<JointVector> configuration(const TipGoal& goal) const {
     auto q = tips.configuration(goal);

@@ -301,7 +301,7 @@ class PythonObserver : public RunObserver {
   std::shared_ptr<const Rig> rig_;
 };
 
-// Of the estimate for now; None without one.
+// A member of the estimate for now; None without one.
 template <typename Member>
 auto of_estimate(Member member) {
   return [member](const Tick& self) {

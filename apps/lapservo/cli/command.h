@@ -21,7 +21,7 @@ using Run = std::function<int()>;
 
 // CLI11 reads the command line; its headers, which take seconds to compile, stay in command.cpp.
 
-/// What is expected of an option's value; empty: nothing.
+/// A condition of an option's value; empty: none.
 using Rule = std::function<void(CLI::Option& option)>;
 /// It must be given, and `rule` holds too.
 Rule required(const Rule& rule = {});

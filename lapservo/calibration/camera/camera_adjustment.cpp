@@ -5,7 +5,6 @@
 #include <ceres/rotation.h>
 #include <cmath>
 #include <cstddef>
-#include <tuple>
 #include <utility>
 
 #include "lapservo/calibration/fit/ceres_fit.h"
@@ -181,28 +180,26 @@ Departures departures_at(ceres::Problem& problem, const FittedNumbers& fitted, c
   return departures_of(fit, slopes);
 }
 
-// Those of the camera's numbers, and that of fy / fx.
-std::optional<std::pair<CameraSigmas, double>> sigmas_of(ceres::Problem& problem, const CameraUnknowns& c, double scale,
-                                                         const FittedNumbers& fitted,
-                                                         const Eigen::MatrixXd& by_faults) {
+// Adds covariance and sigmas, by the noise that is there already; returns whether the fit determines them.
+bool add_covariance(ceres::Problem& problem, const CameraUnknowns& c, const FittedNumbers& fitted,
+                    const Eigen::MatrixXd& by_faults, CameraAdjustment& result) {
   const std::vector<const double*> blocks{&c.focal_px,         &c.aspect, c.centre_px.data(),
                                           c.distortion.data(), &c.k3,     c.magnifications.data()};
-  const auto covariance = covariance_of(problem, blocks);
-  if (!covariance) return std::nullopt;
-  Eigen::MatrixXd all = scale * scale * *covariance;
-  all += fitted.part_of(by_faults, blocks);
-  if (!all.allFinite()) return std::nullopt;
-  const Eigen::VectorXd sigma = all.diagonal().cwiseMax(0).cwiseSqrt();
-  const double fy_variance =
-      c.aspect * c.aspect * all(0, 0) + 2 * c.focal_px * c.aspect * all(0, 1) + c.focal_px * c.focal_px * all(1, 1);
-  const CameraSigmas sigmas{sigma[0],
-                            std::sqrt(std::max(0.0, fy_variance)),
-                            sigma[2],
-                            sigma[3],
-                            {sigma[4], sigma[5], sigma[6], sigma[7], sigma[8]},
-                            sigma[9],
-                            sigma[10]};
-  return std::pair(sigmas, sigma[1]);
+  const auto by_noise = covariance_of(problem, blocks);
+  if (!by_noise) return false;
+  const double scale = std::max(1.0, result.noise);
+  Eigen::MatrixXd covariance = scale * scale * *by_noise;
+  covariance += fitted.part_of(by_faults, blocks);
+  if (!covariance.allFinite()) return false;
+  result.sigma_aspect = std::sqrt(std::max(0.0, covariance(1, 1)));
+  // From focal length and aspect to the two focal lengths.
+  Eigen::MatrixXd change = Eigen::MatrixXd::Identity(covariance.rows(), covariance.cols());
+  change(1, 0) = c.aspect, change(1, 1) = c.focal_px;
+  covariance = change * covariance * change.transpose();
+  result.covariance = covariance.topLeftCorner<9, 9>();
+  const Eigen::VectorXd s = covariance.diagonal().cwiseMax(0).cwiseSqrt();
+  result.sigmas = {s[0], s[1], s[2], s[3], {s[4], s[5], s[6], s[7], s[8]}, s[9], s[10]};
+  return true;
 }
 
 }  // namespace
@@ -265,9 +262,7 @@ std::optional<CameraAdjustment> adjust_camera(const Camera& start, const std::ve
     result.faults = seen_of(departures, possible_faults(views.size()));
     by_faults = departures.by_seen + departures.by_instead;
   }
-  const auto sigmas = sigmas_of(problem, camera, std::max(1.0, result.noise), fitted, by_faults);
-  if (!sigmas) return std::nullopt;
-  std::tie(result.sigmas, result.sigma_aspect) = *sigmas;
+  if (!add_covariance(problem, camera, fitted, by_faults, result)) return std::nullopt;
   return result;
 }
 

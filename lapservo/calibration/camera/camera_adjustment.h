@@ -37,6 +37,7 @@ struct CameraFault {
 struct CameraAdjustment {
   Camera camera;
   CameraSigmas sigmas;
+  Eigen::Matrix<double, 9, 9> covariance = decltype(covariance)::Zero();  ///< as Camera::covariance
   double sigma_aspect = 0;                        ///< of fy / fx
   std::vector<Rigid3> camera_from_board;          ///< as many as views
   std::vector<std::vector<double>> residuals_px;  ///< of each point: found minus expected, along `normal`

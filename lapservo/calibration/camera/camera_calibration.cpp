@@ -346,7 +346,7 @@ CameraCalibration calibrate_camera(const Board& board, const std::vector<BoardVi
   fit = adjust_what_shows(*fit, edges, at_iteration);
   if (!fit) return refuse("the views are too alike to determine the camera");
   calibration.camera = rounded_by_sigmas(fit->camera, fit->sigmas);
-  calibration.sigmas = fit->sigmas;
+  calibration.sigmas = fit->sigmas, calibration.covariance = fit->covariance;
   calibration.bright_wider_px = fit->bright_wider_px[green];
   add_residuals(*fit, edges, calibration);
   calibration.noise = fit->noise, calibration.faults = texts_of(fit->faults, views);

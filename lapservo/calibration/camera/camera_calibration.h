@@ -56,6 +56,7 @@ struct CameraCalibration {
   std::string refusal;
   Camera camera;
   CameraSigmas sigmas;
+  Eigen::Matrix<double, 9, 9> covariance = decltype(covariance)::Zero();  ///< as Camera::covariance
   std::optional<ResponseFit> response;  ///< nullopt where the images do not determine it: the camera's response stays
   std::vector<std::optional<double>>
       view_rms_px;  ///< of edges about the fit, by view, green; none where none is measured

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "lapservo/core/error.h"
+#include "lapservo/core/rounded_covariance.h"
 #include "lapservo/core/rounded_sigma.h"
 
 namespace lapservo::internal {
@@ -132,6 +133,7 @@ Camera measured_camera(const CameraCalibration& calibration) {
   for (double* sigma : {&sigmas.fx_px, &sigmas.fy_px, &sigmas.cx_px, &sigmas.cy_px, &sigmas.blue, &sigmas.red})
     *sigma = rounded_sigma(*sigma);
   for (double& sigma : sigmas.distortion) sigma = rounded_sigma(sigma);
+  camera.covariance = rounded_covariance(calibration.covariance);
   if (calibration.response) camera.response.sigma = rounded_sigma(calibration.response->sigma);
   return camera;
 }

@@ -23,7 +23,7 @@ constexpr bool comes_by_compression(Status status) {
   return status == Status::poor_fit || status == Status::uncertain || status == Status::ambiguous;
 }
 
-/// Of frames that show an instrument, those whose shaft misses the rig's RCM.
+/// Frames that show an instrument, and those of them whose shaft misses the rig's RCM.
 struct MissedRcm {
   int shown = 0;                 ///< frames that show it
   std::vector<double> misses_m;  ///< distances of the shaft's axis from the RCM, where it misses it

@@ -10,7 +10,7 @@
 
 namespace lapservo::internal {
 
-/// What is chosen of ceres::Solver::Options.
+/// The options of ceres::Solver that differ between fits.
 struct SolverChoice {
   ceres::LinearSolverType linear_solver = ceres::DENSE_QR;
   int max_iterations = 50;
@@ -32,7 +32,7 @@ class FittedNumbers {
 
   /// Appends a block, unless it is constant or no residual depends on it.
   void add(double* block);
-  /// Of a covariance of all of them that of these blocks, one after the other; 0 of those that are not fitted.
+  /// The part of a covariance of all numbers that belongs to these blocks, in their order; 0 where one is not fitted.
   Eigen::MatrixXd part_of(const Eigen::MatrixXd& covariance, const std::vector<const double*>& blocks) const;
   const std::vector<double*>& blocks() const { return blocks_; }
   Eigen::Index size() const { return size_; }

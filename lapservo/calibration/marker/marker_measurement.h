@@ -44,7 +44,7 @@ struct SeamRegistration {
 
 /// The seam by which the poses of the calibrated marker agree with the joints, on average, the rig's camera_from_rcm
 /// and joints taken for right. The joints' offset lies in the middle of roll's gap, which a turn there and back shows;
-/// of a turn one way the sigma counts half of a usual gap. What image_delay_s is off by goes the same way: one way
+/// of a turn one way the sigma counts half of a usual gap. An error of image_delay_s shows likewise: one way
 /// the sigma counts sigma_image_delay_s (0 without one), and a rig without image_delay_s is refused.
 SeamRegistration register_seam(const Instrument& instrument, const MarkerCalibration& calibration,
                                const JointRecording& recording);

@@ -83,7 +83,7 @@ bool is_bent_differently(const std::vector<TipSighting>& sightings) {
   return false;
 }
 
-// Of each joint.
+// The mean of each joint.
 std::vector<double> mean_reading(const std::vector<TipSighting>& sightings) {
   std::vector<double> mean_rad(sightings.front().wrist_rad.size(), 0.0);
   for (const TipSighting& sighting : sightings)

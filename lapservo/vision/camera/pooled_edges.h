@@ -39,7 +39,7 @@ struct PooledEdges {
   PooledEdges() { of_measurement.fill(nowhere); }
 };
 
-/// What is taken between pixels, and averaged: at a glance some places' encoded values along straight lines, which
+/// The values between pixels, and their average: at a glance some places' encoded values along straight lines, which
 /// darken what is bright beside an edge, where encoded light bends, for an eighth of the time; closely, those of all
 /// places, by brightness and cubic; or light along straight lines, as fit_step does, which averages without a bias but
 /// is no value that a camera's filters worked on.

@@ -37,7 +37,7 @@ class ColourClasses {
     const std::uint8_t* table = table_.data();  // a local: bytes written could be anything's
     for (std::uint8_t& out : classes) out = table[index(bgr)], bgr += step_bytes;
   }
-  /// Of an instrument's three bands.
+  /// Those of an instrument's three bands.
   const std::array<std::uint8_t, 3>& of_bands(std::size_t instrument) const { return bands_[instrument]; }
   int count() const { return count_; }
 

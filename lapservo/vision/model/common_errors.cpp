@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <numeric>
 
+#include <Eigen/Cholesky>
+
 #include "lapservo/core/inplace_vector.h"
 #include "lapservo/core/statistics.h"
 #include "lapservo/vision/model/normal_equations.h"
@@ -87,6 +89,23 @@ ResidualLine line_of(std::span<const Measurement> measurements, std::size_t grou
   return line;
 }
 
+// A root of the camera's covariance.
+RigErrors::CameraRoot root_of_covariance(const Camera& camera) {
+  RigErrors::CameraRoot root = RigErrors::CameraRoot::Zero();
+  if (camera.covariance) {
+    const Eigen::LDLT<RigErrors::CameraCovariance> parts(*camera.covariance);
+    const RigErrors::CameraCovariance lower = parts.matrixL();
+    root.leftCols<RigErrors::camera_numbers>() =
+        parts.transpositionsP().transpose() * (lower * parts.vectorD().cwiseMax(0).cwiseSqrt().asDiagonal());
+    return root;
+  }
+  const CameraSigmas& sigma = camera.sigmas;
+  root.diagonal() << std::sqrt(2.0 / 3) * sigma.fx_px, std::sqrt(2.0 / 3) * sigma.fy_px, sigma.cx_px, sigma.cy_px,
+      Eigen::Map<const Eigen::Matrix<double, 5, 1>>(sigma.distortion.data());
+  root.rightCols<1>().head<2>() << std::sqrt(1.0 / 3) * sigma.fx_px, std::sqrt(1.0 / 3) * sigma.fy_px;
+  return root;
+}
+
 }  // namespace
 
 double ResidualLine::residual_px(const Measurement& m) const {
@@ -156,13 +175,13 @@ CommonErrors common_errors(const EdgeMeasurements& pass, const EdgeBlur& blur,
 bool has_sigmas(const Camera& camera, const Marker& marker) {
   CameraSigmas geometry = camera.sigmas;
   geometry.blue = geometry.red = 0;
-  return geometry != CameraSigmas{} || camera.response.sigma || marker.measured_sigma_m() || marker.sigmas.diameter_m ||
-         marker.sigmas.wrap_m || marker.sigmas.gap_rad;
+  return geometry != CameraSigmas{} || camera.covariance || camera.response.sigma || marker.measured_sigma_m() ||
+         marker.sigmas.diameter_m || marker.sigmas.wrap_m || marker.sigmas.gap_rad;
 }
 
 RigErrors::RigErrors(const Camera& camera, const Marker& marker, const ShaftPose& pose,
                      const std::array<double, 4>& by_exponent_px)
-    : camera_(&camera) {
+    : camera_(&camera), camera_root_(root_of_covariance(camera)) {
   const MarkerSigmas& sigmas = marker.sigmas;
   const bool measured = marker.measured_sigma_m().has_value();
   const double upper = measured ? common_part(marker.bands_upper_m, *sigmas.bands_upper_m) : 0,
@@ -189,26 +208,26 @@ RigErrors::RigErrors(const Camera& camera, const Marker& marker, const ShaftPose
 
 RigErrors::Shifts RigErrors::of(const Measurement& measurement) const {
   const Camera& c = *camera_;
-  const CameraSigmas& sigma = c.sigmas;
   const Eigen::Vector2d normal = measurement.normal.cast<double>();
-  const Eigen::Vector2d raw_px = measurement.expected_px.cast<double>();
-  // Distortion is small: that of a distorted point is taken for that of the point.
-  const double x = (raw_px.x() - c.cx_px) / c.fx_px, y = (raw_px.y() - c.cy_px) / c.fy_px, r2 = x * x + y * y;
-  const auto along = [&](double u_px, double v_px) { return normal.x() * u_px + normal.y() * v_px; };
-  const auto distorted = [&](double dx, double dy) { return along(c.fx_px * dx, c.fy_px * dy); };
-  const double by_fx = along(x, 0) * sigma.fx_px, by_fy = along(0, y) * sigma.fy_px, common = std::sqrt(1.0 / 3),
-               own = std::sqrt(2.0 / 3);
-  const auto& k = sigma.distortion;
+  const Eigen::Array2d raw_px = measurement.expected_px.cast<double>();
+  const Eigen::Array2d bent = (raw_px - Eigen::Array2d(c.cx_px, c.cy_px)) / Eigen::Array2d(c.fx_px, c.fy_px);
+  // The point without its distortion, to first order.
+  const auto& k = c.distortion;
+  const double bent2 = bent.matrix().squaredNorm();
+  const Eigen::Array2d at = bent / (1 + bent2 * (k[0] + bent2 * (k[1] + bent2 * k[4])));
+  const double x = at.x(), y = at.y(), r2 = x * x + y * y;
+  const auto distorted = [&](double dx, double dy) { return normal.x() * c.fx_px * dx + normal.y() * c.fy_px * dy; };
+  Eigen::Matrix<double, camera_numbers, 1> by_number_px;
+  by_number_px << normal.array() * bent, normal, distorted(x * r2, y * r2), distorted(x * r2 * r2, y * r2 * r2),
+      distorted(2 * x * y, r2 + 2 * y * y), distorted(r2 + 2 * x * x, 2 * x * y),
+      distorted(x * r2 * r2 * r2, y * r2 * r2 * r2);
   const bool of_print = measurement.group < response_px_.size();
   const double turned = measurement.turn_fraction;
   const Eigen::Vector2d edges = measurement.along_px_per_m * Eigen::Vector2d(1 - turned, turned);
   const auto of_print_px = [&](std::size_t i) { return of_print ? edges.dot(along_m_[i][measurement.group]) : 0; };
   Shifts shifts;
-  shifts << common * (by_fx + by_fy), own * by_fx, own * by_fy, along(sigma.cx_px, 0), along(0, sigma.cy_px),
-      k[0] * distorted(x * r2, y * r2), k[1] * distorted(x * r2 * r2, y * r2 * r2),
-      k[2] * distorted(2 * x * y, r2 + 2 * y * y), k[3] * distorted(r2 + 2 * x * x, 2 * x * y),
-      k[4] * distorted(x * r2 * r2 * r2, y * r2 * r2 * r2), of_print ? response_px_[measurement.group] : 0,
-      of_print_px(0), of_print_px(1), of_print_px(2), of_print_px(3) + measurement.row.segment<3>(2).dot(nearer_m_);
+  shifts << camera_root_.transpose() * by_number_px, of_print ? response_px_[measurement.group] : 0, of_print_px(0),
+      of_print_px(1), of_print_px(2), of_print_px(3) + measurement.row.segment<3>(2).dot(nearer_m_);
   return shifts;
 }
 
