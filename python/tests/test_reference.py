@@ -55,7 +55,7 @@ def test_every_column_has_a_row():
 
 def test_every_topic_has_a_row():
     loop, arm = read("lapservo/loop_topics/loop_topics.cpp"), read("lapservo/crtk/crtk_robot.cpp")
-    topics = set(re.findall(r'topic\(rig, "([^"]+)"\)', loop)) | set(re.findall(r'(?:joints\(|topic_of\(arm, )"(\w+)"', arm))
+    topics = set(re.findall(r'topic\(rig, "([^"]+)"\)', loop)) | set(re.findall(r'(?:hear\(|topic_of\(arm, )"(\w+)"', arm))
     assert {"observation", "measured_js", "operating_state", "servo_jp"} <= topics
     rows = first_cells(read("docs/messages.md"))
     assert all(any(row.endswith("/" + topic) for row in rows) for topic in topics), topics
