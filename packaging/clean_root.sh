@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# clean_root.sh FOLDER: installs the packages in FOLDER by apt into a bare Debian 12 of its own and runs debian/tests there, where
-# nothing of the source tree is. Exit code 77, with the reason, where there can be no such root.
+# clean_root.sh FOLDER [RELEASE]: installs the packages in FOLDER by apt into a bare Debian 12 of its own, or that release, for which they
+# were built, and runs debian/tests there, where nothing of the source tree is. Exit code 77, with the reason, where there can be no such root.
 set -euo pipefail
-debs=$(realpath "$1")
+debs=$(realpath "$1") release=${2:-bookworm}
 cd "$(dirname "$0")/.."
 skip() {
   echo "skipped: $*"
@@ -13,7 +13,7 @@ command -v mmdebstrap >/dev/null || skip "mmdebstrap is not installed"
 mirror=${LAPSERVO_MIRROR:-http://deb.debian.org/debian}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-timeout 60 /usr/lib/apt/apt-helper download-file "$mirror/dists/bookworm/Release" "$work/Release" >/dev/null 2>&1 ||
+timeout 60 /usr/lib/apt/apt-helper download-file "$mirror/dists/$release/Release" "$work/Release" >/dev/null 2>&1 ||
   skip "the mirror $mirror can't be reached"
 
 tests=$(sed -n 's/^Tests: //p' debian/tests/control | tr ',' ' ')
@@ -31,4 +31,4 @@ for test in $tests; do
     --customize-hook="echo '== $test'; chroot \"\$1\" su tester -c 'export AUTOPKGTEST_TMP=\$(mktemp -d) && cd \$AUTOPKGTEST_TMP && /tests/$test'"
   )
 done
-mmdebstrap --quiet --variant=apt --dpkgopt=force-unsafe-io --format=null "${hooks[@]}" bookworm /dev/null "$mirror"
+mmdebstrap --quiet --variant=apt --dpkgopt=force-unsafe-io --format=null "${hooks[@]}" "$release" /dev/null "$mirror"
