@@ -27,7 +27,8 @@ constexpr double step_s = 0.02;            // of differences by time
 constexpr double correction_time_s = 0.3;  // of the mean over images
 constexpr double wrist_time_s = 0.02;      // over which its readings count for how it moves
 constexpr double largest_sigma_m = 3e-3;   // of the tip by its tool: that of a place that is registered
-constexpr double wrist_rad_s = 6;          // a turn a second, which a hand hardly exceeds; WildJoints allows for more
+constexpr double wrist_rad_s = 6;          // a turn a second, which a hand hardly exceeds; WildReadings allow for more
+constexpr double wrist_at_once_rad = 0.01;
 
 Eigen::Vector4d difference(const JointVector& from, const JointVector& to) {
   Eigen::Vector4d step = to.vector() - from.vector();
@@ -44,7 +45,10 @@ DesiredFeatures unknown() {
 }  // namespace
 
 TipGoals::TipGoals(const Rig& rig, const Scales& scales)
-    : rig_(rig), scales_(scales), wild_wrist_(Eigen::Vector4d::Constant(wrist_rad_s)), last_(unknown()) {
+    : rig_(rig),
+      scales_(scales),
+      wild_wrist_(Eigen::Vector4d::Constant(wrist_rad_s), Eigen::Vector4d::Constant(wrist_at_once_rad)),
+      last_(unknown()) {
   use(rig.instruments.at(0).camera_from_rcm);
 }
 
@@ -95,12 +99,11 @@ void TipGoals::follow_wrist(const std::vector<double>& now_rad, double time_s) {
   Eigen::Vector4d now = Eigen::Vector4d::Zero();
   static_assert(Tool::max_wrist_joints == decltype(now)::SizeAtCompileTime);
   if (read) std::copy(now_rad.begin(), now_rad.end(), now.begin());
-  const auto verdict = read ? wild_wrist_.validate(time_s, now) : WildJoints::Verdict::wild;
-  if (verdict != WildJoints::Verdict::plausible) wrist_.clear(), past_wrist_.clear();
-  if (verdict == WildJoints::Verdict::wild) return;
-  constexpr double kept_s = 1;  // images are at most 0.6 s old when they come, and 0.3 s late by their stamps
-  while (!past_wrist_.empty() && past_wrist_.front().time_s < time_s - kept_s) past_wrist_.pop_front();
-  past_wrist_.push_back({time_s, now_rad});
+  using Verdict = decltype(wild_wrist_)::Verdict;
+  const Verdict verdict = read ? wild_wrist_.validate(time_s, now) : Verdict::wild;
+  if (verdict != Verdict::plausible) wrist_.clear(), past_wrist_.clear();
+  if (verdict == Verdict::wild) return;
+  past_wrist_.push(time_s, now);
   if (wrist_.size() != size || passed_s > silence_s) {
     wrist_.clear();
     for (const double angle_rad : now_rad) wrist_.push_back({angle_rad, angle_rad});
@@ -128,17 +131,10 @@ std::optional<std::vector<double>> TipGoals::wrist_rad(double ahead_s) const {
 }
 
 std::optional<std::vector<double>> TipGoals::past_wrist_rad(double ago_s) const {
-  if (past_wrist_.empty() || !rig_.instruments[0].tool) return wrist_rad(0);
-  const double time_s = wrist_s_ - ago_s;
-  const auto after = std::find_if(past_wrist_.begin(), past_wrist_.end(),
-                                  [&](const WristReading& reading) { return !(reading.time_s < time_s); });
-  if (after == past_wrist_.begin()) return after->rad;
-  if (after == past_wrist_.end()) return past_wrist_.back().rad;
-  const WristReading& before = *std::prev(after);
-  const double part = (time_s - before.time_s) / (after->time_s - before.time_s);
-  std::vector<double> wrist_rad = before.rad;
-  for (std::size_t i = 0; i < wrist_rad.size(); ++i) wrist_rad[i] += part * (after->rad[i] - before.rad[i]);
-  return wrist_rad;
+  const auto& tool = rig_.instruments[0].tool;
+  if (!tool || past_wrist_.size() == 0) return wrist_rad(0);
+  const Eigen::Vector4d then = past_wrist_.at(std::max(past_wrist_.oldest_s(), wrist_s_ - ago_s)).value();
+  return std::vector<double>(then.begin(), then.begin() + std::ssize(tool->wrist));
 }
 
 std::optional<Rigid3> TipGoals::marker_from_tip(const std::optional<std::vector<double>>& wrist_rad) const {

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <deque>
 #include <limits>
 #include <optional>
 #include <string>
@@ -10,8 +9,9 @@
 
 #include "lapservo/control/controller_config.h"
 #include "lapservo/control/image_measurement.h"
+#include "lapservo/control/joint_history.h"
 #include "lapservo/control/trajectory.h"
-#include "lapservo/control/wild_joints.h"
+#include "lapservo/control/wild_readings.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/robot/robot.h"
 
@@ -49,7 +49,7 @@ class TipGoals {
   /// Readings of the wrist's joints, in the tool's order, moved on by `ahead_s` as they move [rad]; none for a straight
   /// tool. Nullopt without a tool and where the wrist is not known.
   std::optional<std::vector<double>> wrist_rad(double ahead_s) const;
-  /// The same as it was `ago_s` before, by the readings of the last second: between two of them, or the nearest one.
+  /// The same as it was `ago_s` before, by the last 1024 readings: between two of them, or the nearest one.
   std::optional<std::vector<double>> past_wrist_rad(double ago_s) const;
   /// The configuration for a goal, corrected by the images, with the wrist as it is after `ahead_s`.
   std::optional<JointVector> configuration(const TipGoal& goal, double ahead_s = 0) const;
@@ -75,12 +75,8 @@ class TipGoals {
     double smooth_rad = 0, rad_s = 0, rad_s2 = 0;
   };
   std::vector<WristMotion> wrist_;  ///< empty where it is not known
-  struct WristReading {
-    double time_s = 0;
-    std::vector<double> rad;
-  };
-  std::deque<WristReading> past_wrist_;  ///< since when it is known
-  WildJoints wild_wrist_;
+  JointHistory past_wrist_;         ///< since when it is known; 0 behind its joints
+  WildReadings<4> wild_wrist_;
   double wrist_s_ = -std::numeric_limits<double>::infinity();  ///< of the last readings
   bool tip_wanted_ = false;                                    ///< by the goal of the last call
   bool roll_wanted_ = false;
