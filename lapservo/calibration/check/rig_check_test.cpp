@@ -143,9 +143,8 @@ TEST(RigEvidence, ItsPosesHaveTheSigmasOfTheirFrames) {
   Rig measured = true_rig();
   Marker& marker = measured.instruments[0].marker;
   marker.sigmas.bands_upper_m = marker.sigmas.bands_lower_m = std::array{1e-5, 1e-5, 1e-5};
-  marker.sigmas.diameter_m = 2e-5, marker.tolerance_m = 1e-5;
+  marker.sigmas.diameter_m = 2e-5, marker.tolerance_m = 1e-5, measured.camera.covariance.emplace().setIdentity();
   measured.camera.sigmas.fx_px = measured.camera.sigmas.fy_px = 3, measured.camera.response.sigma = 0.01;
-  measured.camera.covariance.emplace().setIdentity();
   RigEvidence exact(true_rig(), 0), evidence(measured, 0);
   for (const cv::Mat& picture : rendered(4, {})) exact.add(picture, 0), evidence.add(picture, 0);
   ASSERT_EQ(evidence.poses().size(), 4U);
