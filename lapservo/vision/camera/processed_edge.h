@@ -38,7 +38,8 @@ inline constexpr int edge_unknowns = EdgeVector::RowsAtCompileTime;
 inline constexpr int edge_offset = 0, edge_before = 1, edge_after = 4, edge_gradient = 7;
 
 /// Samples of a channel, a pixel apart, then those of the next; rows beyond the samples fill a register.
-inline constexpr int edge_rows = 16, all_edge_rows = 3 * edge_rows;
+inline constexpr int of_register = 4, edge_rows = (PooledEdge::samples + of_register - 1) / of_register * of_register,
+                     all_edge_rows = 3 * edge_rows;
 using EdgeSamples = Eigen::Matrix<float, all_edge_rows, 1>;
 
 // Filters of encoded values, symmetric: the taps from the middle on, a pixel apart. One of an unsharp mask or of

@@ -7,12 +7,12 @@
 #include "lapservo/core/statistics.h"
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/marker/azimuths.h"
+#include "lapservo/vision/shaft/sampled_surface.h"
 
 namespace lapservo::internal {
 namespace {
 
 constexpr const TwoMomentsLimits& limits = two_moments_limits;
-constexpr int line_count = 13;
 constexpr double reach = 0.8;  // of the visible half angle
 constexpr int edge_px = 3;     // on both sides of an edge, in which it is over
 constexpr int amid_px = 2;     // on both sides of the middle between two edges
@@ -23,7 +23,7 @@ using Value = Eigen::Vector3f;
 struct BoundaryPoint {
   Eigen::Vector2d raw_px, along;  // `along`: the shaft's direction in the image
 };
-using Boundary = InplaceVector<BoundaryPoint, line_count>;  // from side to side
+using Boundary = InplaceVector<BoundaryPoint, surface_lines>;  // from side to side
 using Boundaries = std::array<Boundary, 4>;
 
 Boundaries boundaries_in_image(const Scene& scene, const ShaftPose& pose, int lines) {
@@ -60,7 +60,7 @@ std::optional<Value> change_at(const Scene& scene, const BoundaryPoint& point, i
 
 // On most lines; zero where it is not seen.
 Value change_of(const Scene& scene, const Boundary& boundary, int pixels) {
-  std::array<InplaceVector<float, line_count>, 3> seen;
+  std::array<InplaceVector<float, surface_lines>, 3> seen;
   for (const BoundaryPoint& point : boundary) {
     const auto change = change_at(scene, point, pixels);
     for (std::size_t c = 0; change && c < 3; ++c) seen[c].push_back((*change)[static_cast<int>(c)]);
@@ -92,7 +92,8 @@ struct FittedBoundaries {
   Boundaries places;
   std::array<Value, 4> changes;
 
-  FittedBoundaries(const Scene& scene, const ShaftPose& pose) : places(boundaries_in_image(scene, pose, line_count)) {
+  FittedBoundaries(const Scene& scene, const ShaftPose& pose)
+      : places(boundaries_in_image(scene, pose, surface_lines)) {
     for (std::size_t k = 0; k < 4; ++k) changes[k] = change_of(scene, places[k], edge_px);
   }
 };
@@ -102,7 +103,7 @@ struct FittedBoundaries {
 template <class Ratio>
 std::optional<float> change_at(const Scene& scene, const FittedBoundaries& fitted, const Boundaries& places,
                                double apart_px, int pixels, const Ratio& ratio) {
-  InplaceVector<float, 4 * line_count> ratios;
+  InplaceVector<float, 4 * surface_lines> ratios;
   for (std::size_t k = 0; k < 4; ++k) {
     if (!(fitted.changes[k].squaredNorm() > 0)) continue;
     for (const BoundaryPoint& place : places[k])
@@ -126,7 +127,7 @@ bool moves_far(const Scene& scene, const PoseUnknowns& from, const PoseUnknowns&
 bool shows_twice(const Scene& scene, const PoseUnknowns& pose, const FittedBoundaries& boundaries,
                  const PoseVector& step) {
   const auto moved_by = [&](double steps) {
-    return boundaries_in_image(scene, pose.changed_by(steps * step).pose(), line_count);
+    return boundaries_in_image(scene, pose.changed_by(steps * step).pose(), surface_lines);
   };
   const auto size_by = [](const Value& change, const Value& seen) { return seen.norm() / change.norm(); };
   const auto part = change_at(scene, boundaries, moved_by(1), limits.apart_px, edge_px, part_of);

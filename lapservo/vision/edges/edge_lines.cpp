@@ -20,8 +20,8 @@ namespace lapservo::internal {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-constexpr std::size_t max_lanes = 16, alignment = max_lanes * sizeof(float);
-using Floats = hn::CappedTag<float, max_lanes>;
+using Floats = hn::ScalableTag<float>;
+constexpr std::size_t max_lanes = hn::MaxLanes(Floats()), alignment = max_lanes * sizeof(float);
 using Ints = hn::RebindToSigned<Floats>;
 using V = hn::Vec<Floats>;
 using VI = hn::Vec<Ints>;

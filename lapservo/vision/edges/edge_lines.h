@@ -4,6 +4,7 @@
 
 #include "lapservo/core/inplace_vector.h"
 #include "lapservo/vision/edges/edge_profile.h"
+#include "lapservo/vision/edges/film_edge.h"
 #include "lapservo/vision/image/light_image.h"
 
 namespace lapservo::internal {
@@ -18,7 +19,7 @@ struct EdgeLine {
   float contour_radius_px = 0;  ///< for EdgeKind::contour
 };
 
-inline constexpr std::size_t max_edge_lines = 512;
+inline constexpr std::size_t max_edge_lines = 4 * max_end_points;  ///< a pass's, of its four boundaries
 using EdgeFits = InplaceVector<EdgeFit, max_edge_lines>;
 
 /// By fit_step or fit_contour.

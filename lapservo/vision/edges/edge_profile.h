@@ -7,7 +7,8 @@ namespace lapservo::internal {
 
 /// Light along a short line across an edge: sample i lies at (first_px + i) px from where the edge is expected.
 struct EdgeProfile {
-  static constexpr std::size_t max_samples = 48;
+  static constexpr int max_reach = 22;  ///< of a line that reaches as far on both sides
+  static constexpr std::size_t max_samples = 2 * max_reach + 1;
   float first_px = 0;
   std::size_t count = 0;
   std::array<std::array<float, max_samples>, 3> light;

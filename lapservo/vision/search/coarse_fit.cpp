@@ -21,8 +21,9 @@ namespace {
 
 constexpr std::size_t samples_along = 128;
 using Surface = SampledSurface<samples_along>;
-constexpr int line_count = Surface::line_count, station_count = 15;
-constexpr int max_reach = 200;      // samples on each side of a section's middle
+constexpr int line_count = surface_lines, station_count = 15;
+// Samples on each side of a section's middle, at most: of half the shaft, and of all.
+constexpr int half_samples = 40, max_reach = half_samples + static_cast<int>(coarse_fit_limits.lateral_reach_px);
 constexpr double max_hidden = 0.8;  // of a section of the shaft: what the image's border leaves must have a side
 
 // Measured image points that lie on the marker's outline or boundaries, attached to where they belong on its surface.
@@ -77,8 +78,8 @@ SidePoints measure_sides(const Scene& scene, const ShaftPose& pose, const Cylind
     const double half_px = (right - left).norm() / 2;
     if (!(half_px > 2) || half_px > 4000) continue;
     const Eigen::Vector2d across = (right - left) / (2 * half_px);
-    const double step_px = std::max(1.0, half_px / 40);
-    const int reach = std::min(static_cast<int>((half_px + reach_px) / step_px), max_reach);
+    const double step_px = std::max(1.0, half_px / half_samples);
+    const int reach = static_cast<int>((half_px + reach_px) / step_px);
     classes.clear();
     double hidden_px = 0;  // of the shaft, beyond the image
     for (int i = -reach; i <= reach; ++i) {

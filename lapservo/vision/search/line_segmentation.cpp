@@ -1,11 +1,11 @@
 #include "lapservo/vision/search/line_segmentation.h"
 
 #include <algorithm>
+#include <vector>
 
 namespace lapservo::internal {
 namespace {
 
-constexpr std::size_t max_samples = 512;
 constexpr std::size_t states = 5;  // shaft, band 0, 1, 2, shaft
 
 // The least on each side of a boundary to count as seen.
@@ -43,8 +43,8 @@ class Rewards {
 }  // namespace
 
 LineSegmentation segment_line(std::span<const std::uint8_t> classes, const std::array<std::uint8_t, 3>& bands) {
-  const std::size_t count = std::min(classes.size(), max_samples);
-  std::array<std::array<bool, states>, max_samples> entered;  // the best path enters this state at this sample
+  const std::size_t count = classes.size();
+  std::vector<std::array<bool, states>> entered(count);  // the best path enters this state at this sample
   std::array<float, states> best{0, 0, 0, 0, 0};
   const Rewards rewards(bands);
   for (std::size_t i = 0; i < count; ++i) {
@@ -63,7 +63,7 @@ LineSegmentation segment_line(std::span<const std::uint8_t> classes, const std::
     if (!entered[i][state]) continue;
     --state;
     segmentation.position[state] = static_cast<double>(i);
-    segmentation.seen[state] = supported(classes.first(count), i, state, bands);
+    segmentation.seen[state] = supported(classes, i, state, bands);
   }
   return segmentation;
 }

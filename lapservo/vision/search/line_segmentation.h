@@ -19,7 +19,7 @@ struct LineSegmentation {
 
 /// The most likely split of the line into shaft, three bands and shaft, by dynamic programming over the five states:
 /// blood, highlights and noise inside a band cost a little but do not break it. `classes` run from proximal to distal;
-/// Scene::outside counts for nothing. At most 512 samples.
+/// Scene::outside counts for nothing.
 LineSegmentation segment_line(std::span<const std::uint8_t> classes, const std::array<std::uint8_t, 3>& bands);
 
 /// The gain of segment_line from a sample of a colour in a state: 0 shaft, 1..3 the bands, 4 shaft. Internal.

@@ -58,10 +58,12 @@ class LineInImage {
   std::array<double, Count> u_px_, v_px_, depth_m_;
 };
 
+/// Lines side by side along a shaft, on which what it shows is looked at.
+inline constexpr int surface_lines = 13;
+
 /// Colour classes along lines of a shaft's visible surface.
 template <std::size_t Samples>
 struct SampledSurface {
-  static constexpr int line_count = 13;
   /// Fraction of the visible half angle that the lines cover: beyond, bands are too foreshortened and dark.
   static constexpr double reach = 0.74;
   struct Line {
@@ -73,9 +75,9 @@ struct SampledSurface {
   SampledSurface(const Scene& scene, const ShaftPose& pose, const CylinderView& view, double beyond_m)
       : first_m(-beyond_m), step_m((scene.marker.length_m() + 2 * beyond_m) / Samples) {
     const Eigen::Vector3d step = pose.camera_from_unrolled.rotation * Eigen::Vector3d(0, 0, step_m);
-    for (int i = 0; i < line_count; ++i) {
+    for (int i = 0; i < surface_lines; ++i) {
       Line& line = lines[static_cast<std::size_t>(i)];
-      line.azimuth_rad = visible_azimuth_rad(view, reach, i, line_count);
+      line.azimuth_rad = visible_azimuth_rad(view, reach, i, surface_lines);
       const LineInImage<Samples> places(scene, point_on(pose, scene.marker, line.azimuth_rad, first_m), step);
       for (std::size_t k = 0; k < Samples; ++k) line.classes[k] = places.class_on_shaft(k);
     }
@@ -86,7 +88,7 @@ struct SampledSurface {
   double samples_before(double along_m) const { return (along_m - first_m) / step_m; }
 
   double first_m, step_m;
-  std::array<Line, line_count> lines;
+  std::array<Line, surface_lines> lines;
 };
 
 }  // namespace lapservo::internal

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <span>
 #include <vector>
@@ -55,10 +56,12 @@ class ShaftCover {
   };
   static constexpr std::size_t lines = 24;
   using EndsOfLines = std::array<std::array<double, 4>, lines>;  // where each visible line crosses the boundaries [m]
-  static constexpr std::uint32_t bit(std::uint8_t colour) { return colour == 0 || colour > 31 ? 0 : 1U << colour; }
+  static constexpr std::uint32_t bit(std::uint8_t colour) {
+    return colour == 0 || colour >= std::numeric_limits<std::uint32_t>::digits ? 0 : 1U << colour;
+  }
 
-  static constexpr double most_px = 1e6;
   std::optional<std::size_t> index(double u_px, double v_px) const {
+    constexpr double most_px = std::numeric_limits<int>::max();
     if (!(u_px >= 0 && v_px >= 0 && u_px < most_px && v_px < most_px)) return std::nullopt;
     const int column = static_cast<int>(u_px) / cell_px - left_, row = static_cast<int>(v_px) / cell_px - top_;
     if (column < 0 || row < 0 || column >= columns_ || row >= rows_) return std::nullopt;
