@@ -7,6 +7,7 @@ namespace lapservo::internal {
 
 inline constexpr double pi = std::numbers::pi;
 inline constexpr double two_pi = 2 * std::numbers::pi;
+inline constexpr double whole_turn_deg = 360;
 
 constexpr double rad_from_deg(double angle_deg) {
   return angle_deg * (pi / 180);
@@ -31,7 +32,7 @@ inline double wrap_two_pi(double angle_rad) {
 
 /// Size of the angle between two hues.
 inline double hue_gap_deg(double a_deg, double b_deg) {
-  return std::abs(std::remainder(a_deg - b_deg, 360.0));
+  return std::abs(std::remainder(a_deg - b_deg, whole_turn_deg));
 }
 
 }  // namespace lapservo::internal

@@ -75,7 +75,9 @@ EdgePlaces places_of(std::size_t boundary, const LightImage& light, std::span<co
   for (const Measurement& m : measurements)
     if (m.group == boundary) located.push_back(&m), residuals_px.push_back(m.residual_px);
   const int count = static_cast<int>(located.size());
-  const int most = look == Look::glance ? 12 : look == Look::light ? 24 : EdgeMeasurements::max_lines;
+  // Where not at all: at as many as every pass has lines, or at twice as many.
+  const int most =
+      look == Look::closely ? EdgeMeasurements::max_lines : (look == Look::light ? 2 : 1) * edge_limits.min_lines;
   const bool glances = look == Look::glance;  // which is to cost little
   const double middle_px = glances || located.empty() ? 0 : median(residuals_px);
   EdgePlaces places;
@@ -114,11 +116,11 @@ PooledEdge mean_of(std::span<const EdgePlace> places) {
 }
 
 // The loss by cubic convolution between pixels, in the mean over all places between them: of its kernel the second
-// moment is 0, the fourth -0.3, and fourth differences have 24.
+// moment is 0, the fourth -0.3, and a fourth difference counts by that over 4!.
 void undo_cubic(PooledEdge& edge) {
-  constexpr float fourth_moment = -0.3F;
+  constexpr float lost = 0.0125F;
   const Eigen::Array2f squares = edge.normal.array().square();
-  const float part = -fourth_moment / 24 * squares.square().sum() / (squares.sum() * squares.sum());
+  const float part = lost * squares.square().sum() / (squares.sum() * squares.sum());
   for (auto& value : edge.value) {
     const auto v = value;
     // At the ends it is even.

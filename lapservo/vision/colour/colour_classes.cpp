@@ -9,7 +9,7 @@ namespace lapservo::internal {
 std::optional<double> hue_deg_of(double b, double g, double r) {
   const double highest = std::max({b, g, r}), chroma = highest - std::min({b, g, r});
   if (chroma < colour_limits.min_chroma || chroma < colour_limits.min_saturation * highest) return std::nullopt;
-  constexpr double sixth_deg = 60;  // of the turn
+  constexpr double sixth_deg = whole_turn_deg / 6;
   if (highest == r) return sixth_deg * (g - b) / chroma;
   if (highest == g) return 2 * sixth_deg + sixth_deg * (b - r) / chroma;
   return 4 * sixth_deg + sixth_deg * (r - g) / chroma;

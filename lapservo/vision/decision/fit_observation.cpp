@@ -8,6 +8,7 @@
 
 #include "lapservo/core/angles.h"
 #include "lapservo/kinematics/centre_line.h"
+#include "lapservo/vision/decision/verification.h"
 
 namespace lapservo::internal {
 namespace {
@@ -41,13 +42,12 @@ Observation observed_line(const CentreLine& line, const Scene& scene, const Fine
 }
 
 // A registration that the shaft misses, known only to the distance and the angle by which it does. Nullopt where that
-// is too much to be of use.
+// is more than psi may have.
 std::optional<RcmPrior> doubted(const RcmPrior& registration, const ShaftPose& pose) {
-  constexpr double most_rad = 0.03;
   const Eigen::Vector3d to_rcm = registration.camera_from_rcm.translation - pose.camera_from_unrolled.translation;
   const Eigen::Vector3d axis = pose.camera_from_unrolled.rotation * Eigen::Vector3d::UnitZ();
   const double missed_m = to_rcm.cross(axis).norm(), missed_rad = std::atan2(missed_m, -to_rcm.dot(axis));
-  if (!(missed_rad < most_rad)) return std::nullopt;
+  if (!(missed_rad < validation_limits.max_sigma_psi_rad)) return std::nullopt;
   RcmPrior wide = registration;
   wide.covariance.diagonal().head<3>().array() += missed_m * missed_m;
   wide.covariance.diagonal().tail<3>().array() += missed_rad * missed_rad;

@@ -261,7 +261,7 @@ struct Basis {
           column[i].store(hn::NegMulAdd(triangle[k][j], columns[k][i].load(), column[i].load()));
       }
       const V square = dot(column, column, samples);
-      independent = hn::And(independent, hn::Gt(square, hn::Mul(hn::Set(d, 1e-5F), before)));
+      independent = hn::And(independent, hn::Gt(square, hn::Mul(hn::Set(d, least_independent), before)));
       triangle[j][j] = hn::Sqrt(square);
       const V factor = hn::Div(hn::Set(d, 1), triangle[j][j]);
       for (std::size_t i = 0; i < samples; ++i) column[i].store(hn::Mul(factor, column[i].load()));

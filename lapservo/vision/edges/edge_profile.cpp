@@ -68,7 +68,7 @@ void add_channel(const EdgeProfile& profile, const Basis<Shapes>& basis, std::si
   }
   const int samples = static_cast<int>(used.size());
   if (samples < unknowns + more_than_unknowns) return;
-  normal.diagonal().array() += 1e-5F;
+  normal.diagonal().array() += least_independent;
   const Eigen::LDLT<Normal> solver(normal);
   const Amplitudes amplitude = solver.solve(light_sum);
   // Derivatives of the model.

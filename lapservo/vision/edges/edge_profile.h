@@ -28,6 +28,8 @@ struct EdgeFit {
 
 /// An edge with less information has no contrast.
 inline constexpr float min_edge_information = 1e-9F;
+/// A shape that differs from the others by less than this part of its square is not set apart by it.
+inline constexpr float least_independent = 1e-5F;
 /// Iterations end below the first; the last of several may move the edge by less than the second, an only one by less
 /// than the third.
 inline constexpr float edge_tolerance_px = 0.004F, max_last_step_px = 0.25F, max_only_step_px = 1.5F;

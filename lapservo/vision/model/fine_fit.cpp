@@ -28,7 +28,7 @@ UnknownVector solve(std::span<const Measurement> measurements, const std::option
       equations.add(m.row, m.residual_px, robust_certainty(m.residual_px - m.row.dot(step), m.sigma_px));
     if (rcm)
       for (const int across : {0, 1}) equations.add(rcm->rows.row(across), rcm->residual[across], 1);
-    const UnknownVector next = equations.solve(1e-9), change = next - step;
+    const UnknownVector next = equations.solve(ridge), change = next - step;
     step = next;
     if (change.dot(equations.information() * change) < fine_fit_limits.settled_sigmas * fine_fit_limits.settled_sigmas)
       break;

@@ -18,7 +18,7 @@ struct FineFitLimits {
   /// How far a point may be off beside its noise and still agree with the fit: edges of blood beside a boundary move
   /// it.
   double tolerated_px = 0.037;
-  double settled_px = 1.5;        ///< a pass that moves no point farther is the last
+  double settled_px = max_only_step_px;  ///< a pass that moves no point farther is the last: one step locates edges
   double settled_blur = 0.1;      ///< change of the blur, a fraction of it, below which edges need not be located again
   double motion_blur_weight = 5;  ///< of its change by that of a point: motion's may be no blur, and never settles
   double settled_oblique_px2 = 0.3;  ///< of a blur's covariance, which moves boundaries by a twentieth of it in px

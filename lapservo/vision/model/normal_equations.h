@@ -29,6 +29,9 @@ class NormalEquations {
   std::array<double, fit_unknowns> gradient_{};
 };
 
+/// So much of a diagonal makes equations solvable that lack a direction, and hardly moves the others.
+inline constexpr double ridge = 1e-9;
+
 /// For a symmetric positive definite matrix; nullopt when it is none to within rounding.
 std::optional<UnknownMatrix> inverse_of(const UnknownMatrix& information);
 

@@ -142,7 +142,6 @@ PrintVector print_pull_of(const CameraPull& pull, const PrintSums& sums, const P
 // Errors of the print that look like one sigma of each number of the rig.
 InplaceVector<PrintVector, RigErrors::most> shapes_of_camera(const PrintInformation& print, const PrintSums& sums,
                                                              const PrintCrossMatrix& through) {
-  constexpr double ridge = 1e-9;
   PrintMatrix solvable = print.information;
   solvable.diagonal().array() += ridge * print.information.trace();
   const Eigen::LDLT<PrintMatrix> factor(solvable);

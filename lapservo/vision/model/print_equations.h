@@ -12,8 +12,6 @@
 
 namespace lapservo::internal {
 
-inline constexpr double mm_in_m = 1e-3;
-
 /// d(residual)/d(print's errors at its upper and at its lower edge) [px/mm].
 inline Eigen::Vector2d print_row(const Measurement& m) {
   const double along = mm_in_m * m.along_px_per_m;

@@ -37,7 +37,7 @@ PrintVector places_mm(const Marker& marker) {
     places_m[lower] = at_upper_m[k] + marker.covered_rad() * slopes_m[k];
     places_m[upper] = at_upper_m[k];
   }
-  return 1e3 * places_m;
+  return m_in_mm * places_m;
 }
 
 }  // namespace

@@ -10,6 +10,8 @@
 
 namespace lapservo::internal {
 
+inline constexpr double m_in_mm = 1e3, mm_in_m = 1 / m_in_mm;
+
 /// Where a print's boundaries may lie elsewhere than the rig says [mm, distal]: e0, e1 at both edges of the print, e2
 /// at both edges, e3: the ends are circles.
 inline constexpr int print_errors = 6;

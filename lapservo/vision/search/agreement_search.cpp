@@ -236,7 +236,7 @@ std::vector<PoseUnknowns> AgreementSearch::results() const {
   std::sort(sorted.begin(), sorted.end(), [](const Result& a, const Result& b) { return a.score > b.score; });
   std::vector<PoseUnknowns> best;
   for (const Result& result : sorted) {
-    constexpr double same_rad = 0.2;
+    constexpr double same_rad = 2 * Observation::false_rad;  // both may be right
     const bool known = std::any_of(best.begin(), best.end(), [&](const PoseUnknowns& other) {
       return std::abs(wrap_pi(other.pose().psi_rad - result.unknowns.pose().psi_rad)) < same_rad;
     });
