@@ -79,7 +79,8 @@ OnGrid shifted(const OnGrid& values, double shift_px) {
 
 // Rec. 601's luma of b, g, r. A colour difference is a channel less luma, so a processed channel is
 // luma(filtered for luma) + channel(filtered for chroma) - luma(filtered for chroma).
-constexpr std::array<float, 3> luma_of{0.114F, 0.587F, 0.299F};
+constexpr float luma_of_blue = 0.114F, luma_of_red = 0.299F;
+constexpr std::array<float, 3> luma_of{luma_of_blue, 1 - luma_of_blue - luma_of_red, luma_of_red};
 
 double luma(const Eigen::Vector3d& bgr) {
   double sum = 0;
@@ -138,7 +139,8 @@ Encoded encode(const LightTable& light_of_value, const PictureProcessing& proces
       for (int i = 0; i < edge_grid; ++i) blurred[static_cast<std::size_t>(i)] = edges.at(place(i));
     const Encoding before = light_at(light_of_value, value_before[c]), after = light_at(light_of_value, value_after[c]);
     const float step = after.y - before.y;
-    std::size_t near = static_cast<std::size_t>(255 * std::clamp(value_before[c], 0.0, 0.99));
+    auto near = std::min<std::size_t>(LightImage::saturated_value,
+                                      static_cast<std::size_t>(255 * std::clamp(value_before[c], 0.0, 1.0)));
     for (int i = 0; i < edge_grid; ++i) {
       const BlurredEdge& here = blurred[static_cast<std::size_t>(i)];
       const auto distance_px = static_cast<float>(i - half_grid);

@@ -2,8 +2,6 @@
 
 #include <cstddef>
 
-#include "lapservo/core/angles.h"
-
 namespace lapservo::internal {
 
 PoseUnknowns InstrumentMemory::expected_pose(double at_s) const {
@@ -48,7 +46,6 @@ void PrintRecord::add(double tau_rad, View view) {
 PrintSides PrintRecord::known_sides() const {
   PrintSides known;
   if (std::ranges::count(views_, View::off) > 0 || std::ranges::count(views_, View::the_rigs) < 2) return known;
-  const auto reach = [](double rad) { return static_cast<std::size_t>(std::lround(rad / two_pi * print_sides)); };
   const auto seen_within = [&](std::size_t side, std::size_t steps) {
     std::size_t seen = 0;
     for (std::size_t i = 0; i <= 2 * steps; ++i)
@@ -56,8 +53,8 @@ PrintSides PrintRecord::known_sides() const {
     return seen;
   };
   for (std::size_t side = 0; side < print_sides; ++side)
-    known[side] = seen_within(side, reach(print_record_limits.near_rad)) >= 1 &&
-                  seen_within(side, reach(print_record_limits.in_view_rad)) >= 2;
+    known[side] = seen_within(side, print_record_limits.near_sides) >= 1 &&
+                  seen_within(side, print_record_limits.in_view_sides) >= 2;
   return known;
 }
 

@@ -76,8 +76,8 @@ InstrumentMemory remembered(const std::optional<InstrumentMemory>& before, const
 /// The evidence of a run's frames about a print.
 struct PrintRecordLimits {
   double wholly_located = 0.8, most_p_false = 1e-4;  ///< the rig's: all boundaries on such a part, psi so rarely wrong
-  /// From one side that is so near, and two that show much of the same (a camera sees 1 rad to either side).
-  double near_rad = 0.6, in_view_rad = 1.2;
+  /// From one so many sides away at most, and two that show much of the same (a camera sees four to either side).
+  std::size_t near_sides = 2, in_view_sides = 5;
   double exchange_s = 2;                        ///< of which nothing was added for so long may be another instrument's
   int least_off_sides = 3, off_for_others = 2;  ///< and so many times those from which it may be the rig's
 };

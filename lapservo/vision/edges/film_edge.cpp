@@ -79,13 +79,13 @@ InplaceVector<double, max_end_points> gloss_of(std::span<const EndPoint> points)
 // with P the integral of a Gaussian of sqrt(2) blurs, to third order in w; what bounds that is fitted to the whole
 // solution, to 2 % up to w = 2 and s = 2.7. Beyond three blurs the series means nothing; the fraction changes little.
 FilmShift film_shift(double level, double width_blurs) {
-  constexpr double bound = 0.175, widest = 3;
+  constexpr double variance = 2, bound = 0.175, widest = 3;
   if (width_blurs > widest) {
     const double fraction = film_shift(level, widest).fraction;
     return {fraction, fraction};
   }
   const double square = width_blurs * width_blurs;
-  const double bend = level * (1 - level) * (2 * level - 1) / 12;
+  const double bend = level * (1 - level) * (2 * level - 1) / (6 * variance);
   const double bounded = bound * std::max({0.0, level * level - 1, (1 - level) * (1 - level) - 1});
   const double less = 1 / (1 + bounded * square);
   return {level + bend * square * less, level + bend * square * (3 + bounded * square) * less * less};

@@ -11,9 +11,10 @@
 namespace lapservo::internal {
 namespace {
 
-// With constant acceleration from rest, by psi's variance over the exposure: a turn T has a variance of 4/45 T^2 about
-// its mean, which lies T / 12 from psi in the middle.
-constexpr double square_of_uneven = 45.0 / 4 / 144;
+// With constant acceleration from rest psi has a mean of T / 3 over the exposure that turns it by T, a mean square of
+// T^2 / 5, and T / 4 in the middle: the latter two by the mean. And how far the middle is off, by psi's variance.
+constexpr double mean_square = 3 * 3 / 5.0, middle = 3.0 / 4;
+constexpr double square_of_uneven = (1 - middle) * (1 - middle) / (mean_square - 1);
 
 // How steep the boundaries are: the mean of their squares [px^2/rad^2], and which show at all.
 struct Steepness {

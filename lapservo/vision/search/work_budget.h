@@ -50,14 +50,15 @@ class WorkBudget {
 /// a frame has few of, the 90th percentile; of what it has hundreds of, the mean of the frames with most of them. A
 /// step's cost is spent; what must be left for it to begin is what most take.
 struct SearchCosts {
-  double coarse_fit = 320, no_coarse_fit = 160;  ///< one that found the shaft; one that did not
-  double fine_pass = 180, fine_end = 160;        ///< of a fine fit; when it converged, the print and its validation
-  double processing = 2400;                      ///< where the first guess at a camera's processing is not enough
-  double departure = 150;                        ///< whether the camera departs from the rig's
-  double no_starts = 15;                         ///< of one blob that has none
-  double starts = 330;       ///< of one that has, through the RCM; beside others lines are split twice
-  double free_starts = 500;  ///< the same without the RCM
-  double agreement = 12;     ///< of one pose with the frame's colours
+  double coarse_fit = 320;                 ///< one that found the shaft
+  double no_coarse_fit = coarse_fit / 2;   ///< one that did not, in its first round
+  double fine_pass = 180, fine_end = 160;  ///< of a fine fit; when it converged, the print and its validation
+  double processing = 2400;                ///< where the first guess at a camera's processing is not enough
+  double departure = 150;                  ///< whether the camera departs from the rig's
+  double no_starts = 15;                   ///< of one blob that has none
+  double starts = 330;                     ///< of one that has, through the RCM; beside others lines are split twice
+  double free_starts = 500;                ///< the same without the RCM
+  double agreement = 12;                   ///< of one pose with the frame's colours
   double blobs_per_px = 2.2e-4;
   double part_beside = 0.6;  ///< of the budget where every sample is tested for another instrument that hides it
   double cover = 1300;       ///< where one instrument lies, for who looks for another beside or behind it
