@@ -36,11 +36,11 @@ cv::Mat hue_mask(const cv::Mat& hsv, double hue_deg, double reach_deg) {
     cv::inRange(hsv, cv::Scalar(low_deg / 2, min_saturation, min_value), cv::Scalar(high_deg / 2, 255, 255), mask);
     return mask;
   };
-  constexpr double turn_deg = 360, last_deg = turn_deg - 1;
+  constexpr double last_deg = whole_turn_deg - 1;
   const double low = hue_deg - reach_deg, high = hue_deg + reach_deg;
   cv::Mat mask = in_range(std::max(0.0, low), std::min(last_deg, high));
-  if (low < 0) mask |= in_range(low + turn_deg, last_deg);
-  if (high > last_deg) mask |= in_range(0, high - turn_deg);
+  if (low < 0) mask |= in_range(low + whole_turn_deg, last_deg);
+  if (high > last_deg) mask |= in_range(0, high - whole_turn_deg);
   return mask;
 }
 
@@ -110,15 +110,14 @@ std::optional<MiddleLine> middle_line(const Camera& camera, const BandMasks& mas
   struct Extent {
     double low = HUGE_VAL, high = -HUGE_VAL;
   };
-  constexpr int middle = 2048;  // of as many sections on either side
-  std::vector<Extent> sections(2 * middle);
+  const int middle = camera.width_px + camera.height_px;  // of as many sections on either side
+  std::vector<Extent> sections(static_cast<std::size_t>(2 * middle));
   double first = HUGE_VAL, last = -HUGE_VAL;
   for (const cv::Point& pixel : pixels) {
     const Eigen::Vector2d offset = Eigen::Vector2d(pixel.x + region.box.x, pixel.y + region.box.y) - origin;
     const double x = offset.dot(along);
     first = std::min(first, x), last = std::max(last, x);
-    const double index = std::clamp(x + middle, 0.0, 2.0 * middle - 1);
-    Extent& section = sections[static_cast<std::size_t>(index)];
+    Extent& section = sections[static_cast<std::size_t>(x + middle)];
     section.low = std::min(section.low, offset.dot(across)), section.high = std::max(section.high, offset.dot(across));
   }
   const double widest = 0.15 * (last - first);  // the ends are round
@@ -290,7 +289,7 @@ std::optional<Observation> observe_edges(const Camera& camera, const Instrument&
   const double sigma_seam_rad = marker.sigmas.seam_rad.value_or(0);
   rcm.covariance(3, 3) =
       std::max(rcm.covariance(3, 3), o.sigma_tau_rad * o.sigma_tau_rad) + sigma_seam_rad * sigma_seam_rad;
-  rcm.covariance.diagonal().array() += 1e-12;
+  rcm.covariance.diagonal().array() += derivative_step * derivative_step;
   o.rcm = rcm;
   o.camera_from_unrolled = *camera_from_rcm * rcm_from_unrolled(*q);
   o.psi_rad = q->psi_rad;
