@@ -43,8 +43,7 @@ void SurfaceTracker::disregard_frame(std::size_t i) {
 }
 
 void SurfaceTracker::forget() {
-  for (std::size_t i = 0; i < tracked_.size(); ++i) forget(i);
-  for (Tracked& it : tracked_) it.print = {};
+  for (std::size_t i = 0; i < tracked_.size(); ++i) forget(i), tracked_[i].print = {};
   blended_s_.reset();
 }
 
@@ -159,8 +158,7 @@ bool SurfaceTracker::look_for_lost(const ImageView& image, const LightImage& lig
 // Those that are followed first: the others share what is left of the budget. Without a budget they are looked for
 // again beside those that were found after them: else the next frame does that.
 void SurfaceTracker::find(const ImageView& image, const LightImage& light, WorkBudget& budget) {
-  for (Tracked& it : tracked_) it.cover.clear();
-  for (Tracked& it : tracked_) it.found = {};  // all, before one is followed beside the others
+  for (Tracked& it : tracked_) it.cover.clear(), it.found = {};  // all, before one is followed beside the others
   bool lost = next_frame_ = false;
   for (Tracked& it : tracked_) {
     if (it.memory) it.found = follow_known(image, light, it, budget);
@@ -190,8 +188,7 @@ const std::vector<Observation>& SurfaceTracker::track(const cv::Mat& image_bgr, 
   const LightImage light(image, light_, channels_);
   if (options_.single) forget();
   now_s_ = clock_.next(time_s);
-  for (Tracked& it : tracked_) it.print.begin_frame(now_s_);
-  for (Tracked& it : tracked_) it.print_before = it.print;
+  for (Tracked& it : tracked_) it.print.begin_frame(now_s_), it.print_before = it.print;
   WorkBudget budget(options_.single ? std::nullopt : options_.frame_budget);
   find(image, light, budget);
   const bool is_blended = remember(image);

@@ -32,10 +32,6 @@ std::optional<Segment> axis_in_image(const Camera& camera, const ShaftPose& pose
   return Segment{camera.ideal_from_point(from), camera.ideal_from_point(to), std::min(from.z(), to.z())};
 }
 
-std::optional<Segment> marker_in_image(const Camera& camera, const Marker& marker, const ShaftPose& pose) {
-  return axis_in_image(camera, pose, 0, marker.length_m());
-}
-
 // With what may be seen of the shaft on both sides.
 std::optional<Segment> shaft_in_image(const Camera& camera, const Marker& marker, const ShaftPose& pose) {
   return axis_in_image(camera, pose, -before_m, (1 + reach_lengths) * marker.length_m());
@@ -153,7 +149,7 @@ void ShaftCover::fill(const Section& section, const Marker& marker, const EndsOf
 bool may_meet(const Camera& camera, const Marker& marker, const ShaftPose& pose, const Marker& others_marker,
               const ShaftPose& other) {
   constexpr double apart_px = 12;
-  const auto marked = marker_in_image(camera, marker, pose);
+  const auto marked = axis_in_image(camera, pose, 0, marker.length_m());
   const auto shaft = shaft_in_image(camera, others_marker, other);
   if (!marked || !shaft) return false;
   // The part of the other's shaft that is nearest to the camera may be far from here.
@@ -167,7 +163,7 @@ bool lies_beside(const Camera& camera, const Marker& others_marker, const ShaftP
                  const std::array<std::uint8_t, 3>& bands) {
   constexpr double beside_px = 24, doubt = 0.12;  // of the length, by which a leaning marker's ends bulge
   const auto shaft = shaft_in_image(camera, others_marker, other);
-  const auto marked = marker_in_image(camera, others_marker, other);
+  const auto marked = axis_in_image(camera, other, 0, others_marker.length_m());
   if (!shaft || !marked) return false;
   const double radius_px = camera.fx_px * others_marker.radius_m() / marked->nearest_m;
   const Eigen::Vector2d along_px = marked->to_px - marked->from_px;

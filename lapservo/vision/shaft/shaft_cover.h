@@ -3,7 +3,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <optional>
 #include <span>
 #include <vector>
@@ -56,15 +55,14 @@ class ShaftCover {
   };
   static constexpr std::size_t lines = 24;
   using EndsOfLines = std::array<std::array<double, 4>, lines>;  // where each visible line crosses the boundaries [m]
-  static constexpr std::uint32_t bit(std::uint8_t colour) {
-    return colour == 0 || colour >= std::numeric_limits<std::uint32_t>::digits ? 0 : 1U << colour;
-  }
+  static constexpr std::uint32_t bit(std::uint8_t colour) { return colour < 8 * sizeof(1U) ? 1U << colour : 0; }
 
   std::optional<std::size_t> index(double u_px, double v_px) const {
-    constexpr double most_px = std::numeric_limits<int>::max();
-    if (!(u_px >= 0 && v_px >= 0 && u_px < most_px && v_px < most_px)) return std::nullopt;
+    const auto within = [](double px, int first, int count) {
+      return px >= first * cell_px && px < (first + count) * cell_px;
+    };
+    if (!within(u_px, left_, columns_) || !within(v_px, top_, rows_)) return std::nullopt;
     const int column = static_cast<int>(u_px) / cell_px - left_, row = static_cast<int>(v_px) / cell_px - top_;
-    if (column < 0 || row < 0 || column >= columns_ || row >= rows_) return std::nullopt;
     return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) + static_cast<std::size_t>(column);
   }
   void frame(const Camera& camera);
