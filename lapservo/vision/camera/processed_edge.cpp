@@ -285,7 +285,7 @@ std::vector<std::array<double, 3>> filtered_light(const LightTable& light_of_val
   std::vector<Eigen::Vector3d> differences(light.size());  // to luma
   std::vector<std::array<double, 3>> out(light.size());
   std::vector<double> lumas;
-  std::size_t near = 128;
+  std::size_t near = light_of_value.size() - 2;
   for (std::size_t i = 0; i < light.size(); ++i) {
     for (std::size_t c = 0; c < 3; ++c)
       differences[i][static_cast<int>(c)] =

@@ -70,7 +70,7 @@ Value change_of(const Scene& scene, const Boundary& boundary, int pixels) {
 
 double distance_px(const Eigen::Vector2d& from, const Eigen::Vector2d& to, const Eigen::Vector2d& raw_px) {
   const Eigen::Vector2d way = to - from;
-  const double at = std::clamp((raw_px - from).dot(way) / std::max(way.squaredNorm(), 1e-9), 0.0, 1.0);
+  const double at = std::clamp((raw_px - from).dot(way) / way.squaredNorm(), 0.0, 1.0);
   return (from + at * way - raw_px).norm();
 }
 

@@ -329,11 +329,9 @@ FitLanes project(const LineLanes& lines, const std::array<Column, 3>& light, V s
   // For the blur, whatever the position is.
   fit.value[FitLanes::blur_gradient] = hn::NegMulAdd(offset, both, gradient[1]);
   fit.value[FitLanes::blur_information] = hn::NegMulAdd(hn::Div(both, information[0][0]), both, information[1][1]);
-  // Comparisons with what is not finite are false.
-  const V huge = hn::Set(d, 1e30F);
   fit.converged =
       hn::And(hn::And(basis.independent, hn::Gt(information[0][0], hn::Set(d, min_edge_information))),
-              hn::And(hn::Ge(degrees, hn::Set(d, 3)), hn::And(hn::Lt(hn::Abs(offset), huge), hn::Lt(variance, huge))));
+              hn::And(hn::Ge(degrees, hn::Set(d, 3)), hn::And(hn::IsFinite(offset), hn::IsFinite(variance))));
   return fit;
 }
 

@@ -69,7 +69,7 @@ InplaceVector<double, max_end_points> gloss_of(std::span<const EndPoint> points)
   if (points.empty()) return gloss;
   const float veil = quantile(shafts, veil_quantile);
   for (const EndPoint& point : points) {
-    const double beyond = std::max(0.0F, point.shaft - veil) / std::max(point.step, 1e-9F);
+    const double beyond = std::max(0.0F, point.shaft - veil) / std::max(point.step, std::numeric_limits<float>::min());
     gloss.push_back(std::min(beyond, film_edge_limits.most_gloss));
   }
   return gloss;
