@@ -18,6 +18,7 @@ namespace lapservo::internal {
 namespace {
 
 constexpr double least_sine = 0.05;  // of the angle from the pole: lines fan out
+constexpr double few = 0.25;         // of samples or lines, which may show what most do not
 constexpr std::size_t line_count = 32, few_lines = 12, line_samples = 112, most_starts = 3;
 
 // Rays of the camera by their angles: alpha about a pole, beta from it. The pole is the direction to a point that the
@@ -39,7 +40,6 @@ struct RaysFromPole {
 struct Line {
   LineSegmentation split;
   double score = 0;
-  double length() const { return split.position[3] - split.position[0]; }
 };
 
 using Lines = std::vector<Line>;
@@ -68,10 +68,9 @@ using BandCosines = std::array<std::vector<double>, 3>;
 // side of its neighbour, as in another marker's order. A blob of several markers may have all orders.
 bool may_be_in_order(BandCosines& bands) {
   constexpr std::size_t min_samples = 2;
-  constexpr double quarter = 0.25;
   const auto shows = [&](std::size_t band) { return bands[band].size() >= min_samples; };
   const auto is_contradicted = [&](std::size_t band) {
-    return shows(band) && shows(band + 1) && quantile(bands[band], 1 - quarter) < quantile(bands[band + 1], quarter);
+    return shows(band) && shows(band + 1) && quantile(bands[band], 1 - few) < quantile(bands[band + 1], few);
   };
   return shows(1) && (shows(0) || shows(2)) && !is_contradicted(0) && !is_contradicted(1);
 }
@@ -139,7 +138,7 @@ Line line_at(const Scene& scene, const RaysFromPole& rays, double alpha_rad, con
 Window window_about(const Scene& scene, const Fan& fan, std::size_t middle) {
   Window window{middle};
   const Line& line = fan.lines[middle];
-  const double length_rad = line.length() * fan.step_beta_rad;
+  const double length_rad = (line.split.position[3] - line.split.position[0]) * fan.step_beta_rad;
   const double beta_rad = fan.beta_rad((line.split.position[0] + line.split.position[3]) / 2);
   const double half_rad = 0.8 * scene.marker.radius_m() / scene.marker.length_m() * length_rad;
   const auto half = static_cast<std::size_t>(half_rad / std::max(least_sine, std::sin(beta_rad)) / fan.step_alpha_rad);
@@ -234,8 +233,7 @@ Extent extent_of(const Scene& scene, const Fan& fan, const Window& window) {
     if (lines[i].split.seen[3]) last.push_back(fan.beta_rad(lines[i].split.position[3]));
   }
   Extent extent{fan.rays, fan.alpha_rad(sum / count), 0, agreed_end(first), agreed_end(last)};
-  constexpr double most_of_them = 0.75;
-  extent.other_bands = with_other_bands > most_of_them * count;
+  extent.other_bands = with_other_bands > (1 - few) * count;
   const Line& middle = lines[window.middle];
   const double from_rad = fan.beta_rad(middle.split.position[0]), to_rad = fan.beta_rad(middle.split.position[3]);
   extent.sine_of_beta = std::sin((from_rad + to_rad) / 2);

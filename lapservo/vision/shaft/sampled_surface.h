@@ -36,16 +36,11 @@ class LineInImage {
   /// Nullptr where the image says nothing of it: beyond its border, where another instrument hides it or, beside the
   /// shaft, where another one's marker shows.
   const std::uint8_t* pixel(std::size_t k, bool on_shaft) const {
-    const double u = u_px_[k] + 0.5, v = v_px_[k] + 0.5;
-    if (!(depth_m_[k] > LensField::nearest_m && u >= 0 && v >= 0 && u < scene_.image.width_px &&
-          v < scene_.image.height_px))
-      return nullptr;
-    if (!scene_.others.empty()) {
-      const Eigen::Vector2d raw_px(u_px_[k], v_px_[k]);
-      if (scene_.hidden(raw_px, depth_m_[k]) || (!on_shaft && scene_.class_beside(raw_px) == Scene::outside))
-        return nullptr;
-    }
-    return scene_.image.pixel(static_cast<int>(u), static_cast<int>(v));
+    const Eigen::Vector2d raw_px(u_px_[k], v_px_[k]);
+    const std::uint8_t* const bgr = depth_m_[k] > LensField::nearest_m ? scene_.pixel_at(raw_px) : nullptr;
+    if (!bgr || scene_.others.empty()) return bgr;
+    const bool is_others = !on_shaft && scene_.class_beside(raw_px) == Scene::outside;
+    return is_others || scene_.hidden(raw_px, depth_m_[k]) ? nullptr : bgr;
   }
   /// Colour class of the shaft there, Scene::outside where the image says nothing of it.
   std::uint8_t class_on_shaft(std::size_t k) const {
