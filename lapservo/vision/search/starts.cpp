@@ -48,7 +48,6 @@ using Lines = std::vector<Line>;
 struct Window {
   std::size_t middle = 0, first = 0, last = 0;  // lines
   double score = 0;
-  bool has(std::size_t line) const { return line >= first && line <= last; }
 };
 
 // The part of the rays that a blob lies in, split into lines from the pole.
@@ -174,8 +173,8 @@ std::vector<Window> best_windows(const Scene& scene, const Fan& fan) {
   std::sort(all.begin(), all.end(), [](const Window& a, const Window& b) { return a.score > b.score; });
   for (const Window& window : all) {
     if (best.size() == most_starts || window.score < least * all[0].score) break;
-    if (std::none_of(best.begin(), best.end(), [&](const Window& other) { return other.has(window.middle); }))
-      best.push_back(grown(window, fan.lines));
+    const auto has = [line = window.middle](const Window& other) { return line >= other.first && line <= other.last; };
+    if (std::ranges::none_of(best, has)) best.push_back(grown(window, fan.lines));
   }
   return best;
 }

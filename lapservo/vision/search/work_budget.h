@@ -50,8 +50,7 @@ class WorkBudget {
 /// a frame has few of, the 90th percentile; of what it has hundreds of, the mean of the frames with most of them. A
 /// step's cost is spent; what must be left for it to begin is what most take.
 struct SearchCosts {
-  double coarse_fit = 320;                 ///< one that found the shaft
-  double no_coarse_fit = coarse_fit / 2;   ///< one that did not, in its first round
+  double coarse_fit = 320, no_coarse_fit = coarse_fit / 2;  ///< that found the shaft; that did not, in its first round
   double fine_pass = 180, fine_end = 160;  ///< of a fine fit; when it converged, the print and its validation
   double processing = 2400;                ///< where the first guess at a camera's processing is not enough
   double departure = 150;                  ///< whether the camera departs from the rig's
