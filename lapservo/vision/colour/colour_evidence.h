@@ -23,13 +23,17 @@ inline Shows grey_or_other(const std::uint8_t* bgr) {
   return most < dark || most - least < least_saturation * most ? Shows::grey : Shows::other;
 }
 
+/// All that is none of the others is `other`.
+constexpr std::array<double, 4> frequencies(double its_band, double another_band, double grey) {
+  return {its_band, another_band, grey, 1 - (grey + another_band + its_band)};
+}
 /// How often pixels show what, by place: `accuracy_study colours 900 71`, frames in which blood hides 5 to 60 % of the
 /// marker. On the shaft and beside it no band belongs there: any of the three is a third of what has their colours.
-inline constexpr std::array<std::array<double, 4>, 3> colour_frequencies{{
-    {0.682, 0.016, 0.050, 0.252},  // band
-    {0.014, 0.027, 0.625, 0.334},  // shaft
-    {0.011, 0.022, 0.129, 0.838},  // beside
-}};
+inline constexpr std::array colour_frequencies{
+    frequencies(0.682, 0.016, 0.050),  // band
+    frequencies(0.014, 0.027, 0.625),  // shaft
+    frequencies(0.011, 0.022, 0.129),  // beside
+};
 
 /// Evidence for a pose by a pixel: the logarithm of how much more often it shows that in its place than anywhere in a
 /// marker and beside it, in units of that of a band's own colour.

@@ -21,7 +21,7 @@ const Eigen::Vector4d steps_of_place = first_steps.cwiseProduct(Eigen::Vector4d(
                       steps_of_rotation = first_steps / (1 << halvings_of_place);
 constexpr int rotations = 48;  // of a turn
 constexpr std::size_t most_peaks = 4, most_results = 3;
-constexpr std::array depth_scales{0.64, nearer_scale, 1.0};
+constexpr std::array depth_scales{nearer_scale * nearer_scale, nearer_scale, 1.0};
 
 // The pose that shows the same in the middle of the marker, at another depth.
 std::optional<PoseUnknowns> seen_at_depth(const PoseUnknowns& start, double scale, const Rigid3& camera_from_rcm,
