@@ -85,14 +85,14 @@ double area_px2(const Scene& scene, const ShaftPose& pose) {
 double explained_area_px2(const Scene& scene, const ShaftPose& pose, bool turned, double above_px2) {
   constexpr std::size_t beyond = 6;
   constexpr int lines = 9;
-  constexpr double line_reach = 0.85, rounding = 1e-6;
+  constexpr double line_reach = 0.85;
   constexpr std::array beside_radii{1.08, 1.2};
   const double most_of_line = places_along + 2 * beyond * colour_evidence.of(Place::shaft, Shows::grey);
   const double most_beside = 2 * beside_radii.size() * places_along * colour_evidence.of(Place::beside, Shows::other);
   const auto view = view_cylinder(pose.camera_from_unrolled, scene.marker.radius_m());
   if (!view) return no_area_px2;
   const double whole_px2 = area_px2(scene, pose);
-  const double least_gain = above_px2 * (lines * places_along) / whole_px2 - rounding;
+  const double least_gain = above_px2 * (lines * places_along) / whole_px2;
   const Eigen::Vector3d step =
       pose.camera_from_unrolled.rotation * Eigen::Vector3d(0, 0, scene.marker.length_m() / places_along);
   const auto band_of = bands_of_class(scene);
