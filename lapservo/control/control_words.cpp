@@ -16,6 +16,10 @@ std::string_view to_string(HoldReason reason) {
   return word_of(names_up_to<HoldReason::arm_not_enabled>, reason);
 }
 
+std::optional<HoldReason> hold_reason_from_string(std::string_view word) {
+  return read_word(names_up_to<HoldReason::arm_not_enabled>, word);
+}
+
 std::string_view to_string(Repetition repetition) {
   return word_of(names_up_to<Repetition::of_a_noisy_camera>, repetition);
 }

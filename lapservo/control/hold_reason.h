@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string_view>
 
 namespace lapservo {
@@ -25,12 +26,15 @@ enum class HoldReason {
   image_not_following,  ///< the image does not show a joint's motion: ControlStep::unanswered; until a start
   error_grows,          ///< the goal stands and the error grows, although the arm moves: until a start
   delay_not_found,      ///< after ample motion images and joints agree at no delay: until a start
+  tip_open,             ///< the tool, bent as it is, leaves the tip open by more than a goal of the tip allows
+  tip_unreachable,      ///< no configuration in view holds the tip at its goal, as wrist and camera are
   not_learnt,           ///< uncalibrated: the probing motion said too little; it is repeated
   bad_time,             ///< time did not advance
   non_finite,           ///< joints, image, desired features or the result hold a NaN or an infinity
   arm_not_enabled,      ///< the arm's operating state is not ENABLED
 };
-/// The enumerator's name.
+/// The enumerator's name; nullopt for anything else.
 std::string_view to_string(HoldReason reason);
+std::optional<HoldReason> hold_reason_from_string(std::string_view word);
 
 }  // namespace lapservo

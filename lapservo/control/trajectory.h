@@ -10,6 +10,8 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include "lapservo/control/hold_reason.h"
+
 namespace lapservo {
 
 /// Desired features and their derivatives by time: s_rad, r_px, l_px, d_px.
@@ -17,6 +19,7 @@ struct DesiredFeatures {
   Eigen::Vector4d features = Eigen::Vector4d::Zero();
   Eigen::Vector4d rate = Eigen::Vector4d::Zero();
   Eigen::Vector4d acceleration = Eigen::Vector4d::Zero();
+  HoldReason hold = HoldReason::none;  ///< why they can't be followed: the loop holds for it, whatever they are
 };
 
 /// Where the tip of the instrument's tool is wanted, in the camera's frame. The roll is psi but for whole turns, or

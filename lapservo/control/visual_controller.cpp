@@ -149,7 +149,7 @@ HoldReason VisualController::read(double time_s, const Eigen::Vector4d& q_joint,
   following_error_limit_.update(setpoint, q_joint, arm_response_.drive(), arm_response_.lag_s(), interval_s);
   remember(time_s, q_joint, readings);
   measured_ = true;
-  if (!all_finite(desired)) return HoldReason::non_finite;
+  if (desired.hold == HoldReason::none && !all_finite(desired)) return HoldReason::non_finite;
   const Eigen::Array4d behind = (setpoint.position - q_joint).array().abs();
   const bool far = (behind > config_.max_following_error.array()).any();
   return far || following_error_limit_.is_reached() ? HoldReason::not_following : HoldReason::none;
@@ -212,6 +212,7 @@ VisualController::Law VisualController::decide(HoldReason reason, const std::opt
                                                const DesiredFeatures& desired) const {
   if (reason != HoldReason::none || suspended_ != HoldReason::none)
     return {.reason = reason == HoldReason::none ? suspended_ : reason};
+  if (desired.hold != HoldReason::none) return {.reason = desired.hold};
   const auto probing_velocity = estimator_->probing_velocity(config_.period_s);
   Law law = probing_velocity ? Law{.action = ControlAction::probe,
                                    .velocity = *probing_velocity,

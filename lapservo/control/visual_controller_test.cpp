@@ -526,6 +526,8 @@ TEST_P(Holding, NamesEveryReason) {
   DesiredFeatures wild = desired;
   wild.rate[1] = INFINITY;
   EXPECT_EQ(reason_for(t += config.period_s, q, wild), HoldReason::non_finite);
+  wild.hold = HoldReason::tip_open;
+  EXPECT_EQ(reason_for(t += config.period_s, q, wild), HoldReason::tip_open);
   EXPECT_EQ(reason_for(t += config.period_s, q + Eigen::Vector4d(0, 0.5, 0, 0), desired), HoldReason::wild_joints);
 }
 

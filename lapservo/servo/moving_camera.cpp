@@ -55,7 +55,9 @@ void MovingCamera::carry(ServoInput& input, double since_s, const Trajectory& tr
   const auto now = features_in_first(input.time_s, input.desired.features);
   if (first_from_rcm_ && !now) input.image.reset();
   if (input.image) carry(*input.image, first_from_camera, q);
+  const HoldReason hold = input.desired.hold;
   input.desired = last_;
+  input.desired.hold = hold;
   input.desired.rate.setZero(), input.desired.acceleration.setZero();
   if (!now) return;
   input.desired.features = *now;

@@ -94,12 +94,14 @@ TEST_F(MovingCameraTest, GoalsMoveAsTheCameraDoes) {
 TEST_F(MovingCameraTest, WhereTheEndoscopeIsNotKnownTheGoalRestsAndNoImageCounts) {
   ServoInput input = input_at(-1, there);
   input.image.emplace();
-  input.desired = {feature_model(rig)(there.vector())->features, Eigen::Vector4d::Ones(), Eigen::Vector4d::Ones()};
+  input.desired = {feature_model(rig)(there.vector())->features, Eigen::Vector4d::Ones(), Eigen::Vector4d::Ones(),
+                   HoldReason::tip_unreachable};
   const Eigen::Vector4d goal = input.desired.features;
   camera.carry(input, 0, set_point(goal), {});
   EXPECT_FALSE(input.image);
   EXPECT_EQ(input.desired.features, goal);
   EXPECT_TRUE(input.desired.rate.isZero() && input.desired.acceleration.isZero());
+  EXPECT_EQ(input.desired.hold, HoldReason::tip_unreachable);
 }
 
 // Joints that are not known at first leave nothing behind; a goal that no q shows holds the arm.

@@ -88,6 +88,7 @@ void add_input(Fields& fields, const ServoInput& input) {
   fields.add("desired_", features, input.desired.features.data());
   fields.add("desired_", rates, input.desired.rate.data());
   fields.add("desired_", accelerations, input.desired.acceleration.data());
+  fields.add("desired_hold", to_string(input.desired.hold));
 }
 
 void add_decision(Fields& fields, const ServoDecision& decision) {
@@ -226,6 +227,9 @@ ServoInput read_input(const Row& row) {
   input.desired.features = row.numbers("desired_", features);
   input.desired.rate = row.numbers("desired_", rates);
   input.desired.acceleration = row.numbers("desired_", accelerations);
+  const auto hold = hold_reason_from_string(row.text("desired_hold"));
+  if (!hold) row.complain("desired_hold", "none or why the goal can't be followed, see docs/statuses.md");
+  input.desired.hold = *hold;
   return input;
 }
 

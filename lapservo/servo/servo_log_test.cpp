@@ -36,7 +36,7 @@ Record any_record(Random& random, int kind) {
   record.input.time_s = random.uniform(0, 100);
   record.input.joints = {record.input.time_s, JointVector::from_vector(any(random)),
                          kind % 2 ? OperatingState::enabled : OperatingState::fault, kind % 3 != 0, kind % 5 == 0};
-  record.input.desired = {any(random), any(random), any(random)};
+  record.input.desired = {any(random), any(random), any(random), kind % 2 ? HoldReason::tip_open : HoldReason::none};
   for (int i = 0; i < kind % 4; ++i)
     record.input.readings.push_back({random.uniform(), JointVector::from_vector(any(random))});
   if (kind % 3) {
@@ -75,7 +75,7 @@ void expect_same_bits(const ServoInput& a, const ServoInput& b) {
   const auto reading = [](const JointReading& r) { return std::tuple(r.time_s, r.q.vector()); };
   ASSERT_EQ(a.readings.size(), b.readings.size());
   for (std::size_t i = 0; i < a.readings.size(); ++i) EXPECT_EQ(reading(a.readings[i]), reading(b.readings[i]));
-  const auto goal = [](const DesiredFeatures& d) { return std::tuple(d.features, d.rate, d.acceleration); };
+  const auto goal = [](const DesiredFeatures& d) { return std::tuple(d.features, d.rate, d.acceleration, d.hold); };
   EXPECT_EQ(goal(a.desired), goal(b.desired));
   ASSERT_EQ(a.image.has_value(), b.image.has_value());
   if (!a.image) return;

@@ -237,10 +237,13 @@ Trajectory TipGoals::features_of(const Trajectory& goal) {
             if (const auto now = desired(goal, time_s)) {
               last_ = *now;
               if (roll_wanted_) psi_rad_ = configuration(*wanted)->psi_rad, psi_by_ = PsiBy::goal;
-            } else {
-              last_.rate.setZero(), last_.acceleration.setZero();
+              return last_;
             }
-            return last_;
+            last_.rate.setZero(), last_.acceleration.setZero();
+            DesiredFeatures resting = last_;
+            if (camera_from_rcm_)
+              resting.hold = tip_sigma_m(0) > largest_sigma_m ? HoldReason::tip_open : HoldReason::tip_unreachable;
+            return resting;
           },
           goal.tip};
 }

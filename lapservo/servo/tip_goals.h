@@ -33,8 +33,8 @@ class TipGoals {
 
   /// The same trajectory in features, by all that is known at each call; refers to this. Where no configuration
   /// holds the tip at the goal, or the wrist has bent until its tip is left open by more than 3 mm, the features rest
-  /// where they were, and are NaN before the first. They are NaN, for which the loop holds, where the wrist is not
-  /// known.
+  /// where they were, are NaN before the first, and have the reason for which the loop holds; while the registration is
+  /// measured anew the loop holds for that. They are NaN, for which the loop holds, where the wrist is not known.
   Trajectory features_of(const Trajectory& goal);
 
   /// A state of the joints: where the wrist is, how it moves; the psi of a roll that is free until an image has it,

@@ -363,9 +363,17 @@ TEST_F(Refusals, ATipThatABentWristLeavesOpenIsNeitherAcceptedNorFollowed) {
   const Trajectory features = tips.features_of(tip_set_point(goal, ""));
   const Eigen::Vector4d followed = features.at(0).features;
   EXPECT_LT((followed - feature_model(rig)(there.vector())->features).norm(), 1e-6);
+  EXPECT_EQ(features.at(0).hold, HoldReason::none);
   tips.follow(joints_at(1, there, bent_rad));
+  EXPECT_EQ(features.at(1).hold, HoldReason::tip_open);
   EXPECT_EQ(features.at(1).features, followed);
   EXPECT_TRUE(features.at(1).rate.isZero());
+  tips.follow(joints_at(2, there, straight_rad));
+  EXPECT_EQ(features.at(2).hold, HoldReason::none);
+  const TipGoal at_rcm{rig.instruments[0].camera_from_rcm->translation};
+  EXPECT_EQ(tips.features_of(tip_set_point(at_rcm, "")).at(2).hold, HoldReason::tip_unreachable);
+  tips.use({});  // the loop has its own reason
+  EXPECT_EQ(features.at(2).hold, HoldReason::none);
 }
 
 // The seam faces the camera at psi -1.571 and a turn on: d jumps there, and the shaft turns the other way round.
