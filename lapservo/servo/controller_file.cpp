@@ -86,6 +86,14 @@ ControllerConfig load_controller(const std::filesystem::path& path, const Contro
   return config;
 }
 
+ControllerConfig controller_for_arm(ControllerConfig base, const std::optional<std::filesystem::path>& file,
+                                    const std::optional<JointLimits>& arm_limits) {
+  if (arm_limits) base.limits = *arm_limits;
+  ControllerConfig config = file ? load_controller(*file, base) : std::move(base);
+  if (arm_limits) config.limits = both_limits(config.limits, *arm_limits);
+  return checked(config);
+}
+
 std::string controller_yaml(const ControllerConfig& config) {
   std::string text = fmt::format("mode: {}\nperiod_s: {}\ngains_per_s: {}\ndelay_s: {}\nmodel_error: {}\n",
                                  to_string(config.mode), config.period_s, list_of(config.gains.per_s),

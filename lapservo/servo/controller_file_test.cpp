@@ -62,6 +62,18 @@ TEST(ControllerFile, GainsThatNobodyGaveAreThoseOfModeAndPeriod) {
   EXPECT_EQ(load_controller(File("mode: fused\n").path(), base).gains.per_s, TrackingGains().per_s);
 }
 
+TEST(ControllerFile, AFileOnlyNarrowsTheArmsLimits) {
+  JointLimits of_arm;
+  of_arm.lower[0] = -0.5, of_arm.rate[2] = 0.02;
+  const File file("limits: {lower: [-0.8, 0.7, 0.03, -4], acceleration: [1, 2, 0.2, 7.5]}\n");
+  const JointLimits both = controller_for_arm({}, file.path(), of_arm).limits;
+  EXPECT_EQ(both.lower, Eigen::Vector4d(-0.5, 0.7, 0.03, -4));
+  EXPECT_EQ(both.rate, of_arm.rate);
+  EXPECT_EQ(both.acceleration, Eigen::Vector4d(1, 2, 0.2, 7.5));
+  EXPECT_EQ(controller_for_arm({}, {}, of_arm).limits.lower, of_arm.lower);
+  EXPECT_EQ(controller_for_arm({}, file.path(), {}).limits.lower[0], -0.8);
+}
+
 TEST(ControllerFile, NamesFileFieldValueAndExpectation) {
   for (const auto& [text, expected] : {std::pair<std::string, const char*>{"gain: 3\n", "gains_per_s is the nearest"},
                                        {"gains_per_s: [1, 2, 3]\n", "gains_per_s"},

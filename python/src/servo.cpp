@@ -253,19 +253,15 @@ Controller make_controller(const Rig& rig, const std::string& mode, const std::o
                            const std::optional<py::object>& joint_limits) {
   const auto known = control_mode_from_string(mode);
   if (!known) throw InputError("Controller", "mode", mode, "default, fused, paper or uncalibrated");
-  Controller config{*known == ControlMode::paper ? paper_controller(period_s) : ControllerConfig{}, false};
+  ControllerConfig config = *known == ControlMode::paper ? paper_controller(period_s) : ControllerConfig{};
   config.mode = *known;
   config.period_s = period_s;
   config.window = image_window(rig.camera, window_margin_px);
   if (gains_per_s) config.gains.per_s = gains_per_s->value;
   if (delay_s) config.observer.delay_s = *delay_s;
-  if (joint_limits) config.limits = joint_limits_of(*joint_limits, rig);
-  config.has_joint_limits = joint_limits.has_value();
-  const JointLimits of_arm = config.limits;
-  if (path) static_cast<ControllerConfig&>(config) = load_controller(*path, config);
-  if (joint_limits) config.limits = both_limits(config.limits, of_arm);
-  static_cast<ControllerConfig&>(config) = checked(config);
-  return config;
+  std::optional<JointLimits> of_arm;
+  if (joint_limits) of_arm = joint_limits_of(*joint_limits, rig);
+  return {controller_for_arm(config, path, of_arm), of_arm.has_value()};
 }
 
 // A tick as Python keeps it.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <utility>
@@ -43,12 +44,12 @@ ControllerConfig controller_of(const ServoOptions& options, const Rig& rig) {
       throw InputError("--delay-ms", "is " + options.delay + ", expected milliseconds: it looks like seconds");
     config.observer.delay_s = *delay_ms / 1000;
   }
+  std::optional<JointLimits> of_arm;
   if (!options.joint_limits.empty())
-    config.limits = limits_of_q(*arm_of(options, rig).joints, load_arm_limits(options.joint_limits));
-  const JointLimits of_arm = config.limits;
-  if (!options.controller.empty()) config = load_controller(options.controller, config);
-  if (!options.joint_limits.empty()) config.limits = both_limits(config.limits, of_arm);
-  return checked(config);
+    of_arm = limits_of_q(*arm_of(options, rig).joints, load_arm_limits(options.joint_limits));
+  const auto file =
+      options.controller.empty() ? std::nullopt : std::optional<std::filesystem::path>(options.controller);
+  return controller_for_arm(std::move(config), file, of_arm);
 }
 
 std::string names_of(const Rig& rig) {
