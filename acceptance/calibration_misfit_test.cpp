@@ -248,7 +248,7 @@ Answer camera_of(const Recording& recording, const BoardDeparture& departure) {
   const CameraCalibration found = calibration_of_camera(recording, departure);
   if (!found.refusal.empty()) return {found.refusal, {}};
   const Camera& camera = found.camera;
-  const CameraSigmas& sigmas = found.sigmas;
+  const CameraSigmas& sigmas = camera.sigmas;
   Answer answer{"", {}, found.faults};
   answer.errors = {(camera.fx_px - truth.fx_px) / sigmas.fx_px, (camera.cx_px - truth.cx_px) / sigmas.cx_px,
                    (camera.cy_px - truth.cy_px) / sigmas.cy_px};

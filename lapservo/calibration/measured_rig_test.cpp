@@ -77,9 +77,10 @@ TEST(MeasuredRig, HoldsAnotherCamera) {
   CameraCalibration calibration;
   calibration.camera = measured_before().camera;
   calibration.camera.fx_px = 501.25;
-  calibration.sigmas.fx_px = 0.12504, calibration.sigmas.red = 1.00004e-5;
-  calibration.covariance.diagonal().setConstant(1.0 / 3);
   Camera expected = calibration.camera;
+  calibration.camera.sigmas.fx_px = 0.12504, calibration.camera.sigmas.red = 1.00004e-5;
+  calibration.camera.covariance.emplace().setZero();
+  calibration.camera.covariance->diagonal().setConstant(1.0 / 3);
   expected.sigmas.fx_px = 0.125, expected.sigmas.red = 1e-5;
   expected.covariance.emplace().setZero();
   expected.covariance->diagonal().setConstant(0.333333);

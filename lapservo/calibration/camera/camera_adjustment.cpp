@@ -196,9 +196,9 @@ bool add_covariance(ceres::Problem& problem, const CameraUnknowns& c, const Fitt
   Eigen::MatrixXd change = Eigen::MatrixXd::Identity(covariance.rows(), covariance.cols());
   change(1, 0) = c.aspect, change(1, 1) = c.focal_px;
   covariance = change * covariance * change.transpose();
-  result.covariance = covariance.topLeftCorner<9, 9>();
+  result.camera.covariance = covariance.topLeftCorner<9, 9>();
   const Eigen::VectorXd s = covariance.diagonal().cwiseMax(0).cwiseSqrt();
-  result.sigmas = {s[0], s[1], s[2], s[3], {s[4], s[5], s[6], s[7], s[8]}, s[9], s[10]};
+  result.camera.sigmas = {s[0], s[1], s[2], s[3], {s[4], s[5], s[6], s[7], s[8]}, s[9], s[10]};
   return true;
 }
 

@@ -35,11 +35,9 @@ struct CameraFault {
 };
 
 struct CameraAdjustment {
-  Camera camera;
-  CameraSigmas sigmas;
-  Eigen::Matrix<double, 9, 9> covariance = decltype(covariance)::Zero();  ///< as Camera::covariance
-  double sigma_aspect = 0;                                                ///< of fy / fx
-  std::vector<Rigid3> camera_from_board;                                  ///< as many as views
+  Camera camera;                                  ///< with its sigmas and covariance
+  double sigma_aspect = 0;                        ///< of fy / fx
+  std::vector<Rigid3> camera_from_board;          ///< as many as views
   std::vector<std::vector<double>> residuals_px;  ///< of each point: found minus expected, along `normal`
   std::array<double, 3> bright_wider_px{};        ///< by channel: how far edges lie towards dark squares, mean of views
   double noise = 1;                               ///< how many times the points' own sigmas the residuals are; robust

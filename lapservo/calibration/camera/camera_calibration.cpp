@@ -129,7 +129,7 @@ std::optional<CameraAdjustment> adjust_what_shows(const CameraAdjustment& fit, c
   const auto all = adjust_camera(fit.camera, fit.camera_from_board, edges.points, freedom, at_iteration);
   if (!all) return std::nullopt;
   const Camera& camera = all->camera;
-  freedom.k3 = std::abs(camera.distortion[4]) > significant_sigmas * all->sigmas.distortion[4];
+  freedom.k3 = std::abs(camera.distortion[4]) > significant_sigmas * camera.sigmas.distortion[4];
   freedom.aspect =
       std::abs(camera.fy_px / camera.fx_px - 1) > std::max(square_pixels, significant_sigmas * all->sigma_aspect);
   freedom.faults = true;
@@ -151,7 +151,8 @@ void add_residuals(const CameraAdjustment& adjustment, const MeasuredEdges& edge
 }
 
 // The same from the same images: what the last digits of sums are hangs on where in memory the numbers lie.
-Camera rounded_by_sigmas(Camera camera, const CameraSigmas& sigmas) {
+Camera rounded_by_sigmas(Camera camera) {
+  const CameraSigmas& sigmas = camera.sigmas;
   camera.fx_px = rounded_by_sigma(camera.fx_px, sigmas.fx_px);
   camera.fy_px = rounded_by_sigma(camera.fy_px, sigmas.fy_px);
   camera.cx_px = rounded_by_sigma(camera.cx_px, sigmas.cx_px);
@@ -208,7 +209,7 @@ std::vector<std::string> texts_of(const std::vector<CameraFault>& faults, const 
 // Empty where the views suffice.
 std::string refusal_of(const CameraAdjustment& adjustment, const std::vector<BoardView>& views) {
   const Camera& camera = adjustment.camera;
-  const CameraSigmas& sigmas = adjustment.sigmas;
+  const CameraSigmas& sigmas = camera.sigmas;
   if (sigmas.fx_px < max_focal_sigma * camera.fx_px && sigmas.cx_px < max_centre_sigma_px &&
       sigmas.cy_px < max_centre_sigma_px)
     return {};
@@ -345,8 +346,7 @@ CameraCalibration calibrate_camera(const Board& board, const std::vector<BoardVi
   const MeasuredEdges edges = measured(board, views, *fit, true, false);
   fit = adjust_what_shows(*fit, edges, at_iteration);
   if (!fit) return refuse("the views are too alike to determine the camera");
-  calibration.camera = rounded_by_sigmas(fit->camera, fit->sigmas);
-  calibration.sigmas = fit->sigmas, calibration.covariance = fit->covariance;
+  calibration.camera = rounded_by_sigmas(fit->camera);
   calibration.bright_wider_px = fit->bright_wider_px[green];
   add_residuals(*fit, edges, calibration);
   calibration.noise = fit->noise, calibration.faults = texts_of(fit->faults, views);

@@ -54,9 +54,7 @@ std::string advice(const std::vector<BoardView>& views, const cv::Size& size);
 struct CameraCalibration {
   /// Why there is none, and what to do about it: then nothing else counts. Empty when there is one.
   std::string refusal;
-  Camera camera;
-  CameraSigmas sigmas;
-  Eigen::Matrix<double, 9, 9> covariance = decltype(covariance)::Zero();  ///< as Camera::covariance
+  Camera camera;                        ///< with its sigmas and covariance, to all their digits
   std::optional<ResponseFit> response;  ///< nullopt where the images do not determine it: the camera's response stays
   std::vector<std::optional<double>>
       view_rms_px;  ///< of edges about the fit, by view, green; none where none is measured

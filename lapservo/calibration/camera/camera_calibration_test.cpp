@@ -64,7 +64,7 @@ std::vector<BoardView> views_of(const BoardScene& scene, const Camera& camera, i
 
 void expect_found(const Camera& camera, const CameraCalibration& found) {
   ASSERT_EQ(found.refusal, "");
-  const CameraSigmas& sigmas = found.sigmas;
+  const CameraSigmas& sigmas = found.camera.sigmas;
   EXPECT_NEAR(found.camera.fx_px, camera.fx_px, 1e-3 * camera.fx_px);
   EXPECT_NEAR(found.camera.fy_px, camera.fy_px, 1e-3 * camera.fy_px);
   EXPECT_NEAR(found.camera.cx_px, camera.cx_px, 0.5);

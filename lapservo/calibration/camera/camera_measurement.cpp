@@ -128,19 +128,18 @@ CameraMeasurement measure_camera(const Board& board, BoardRecordings recordings,
 
 Camera measured_camera(const CameraCalibration& calibration) {
   Camera camera = calibration.camera;
-  camera.sigmas = calibration.sigmas;
   CameraSigmas& sigmas = camera.sigmas;
   for (double* sigma : {&sigmas.fx_px, &sigmas.fy_px, &sigmas.cx_px, &sigmas.cy_px, &sigmas.blue, &sigmas.red})
     *sigma = rounded_sigma(*sigma);
   for (double& sigma : sigmas.distortion) sigma = rounded_sigma(sigma);
-  camera.covariance = rounded_covariance(calibration.covariance);
+  if (camera.covariance) camera.covariance = rounded_covariance(*camera.covariance);
   if (calibration.response) camera.response.sigma = rounded_sigma(calibration.response->sigma);
   return camera;
 }
 
 std::vector<CalibratedNumber> calibrated_numbers(const Camera& before, const CameraCalibration& calibration) {
   const Camera& after = calibration.camera;
-  const CameraSigmas& sigmas = calibration.sigmas;
+  const CameraSigmas& sigmas = after.sigmas;
   std::vector<CalibratedNumber> numbers{{"fx [px]", before.fx_px, after.fx_px, sigmas.fx_px},
                                         {"fy [px]", before.fy_px, after.fy_px, sigmas.fy_px},
                                         {"cx [px]", before.cx_px, after.cx_px, sigmas.cx_px},

@@ -67,7 +67,7 @@ struct CameraMeasurement {
 CameraMeasurement measure_camera(const Board& board, BoardRecordings recordings, const Camera& start,
                                  const JobWatch& watch);
 
-/// The camera with its sigmas, as a rig holds it.
+/// The camera with its sigmas and covariance to the digits of a rig's file, and the response's sigma.
 Camera measured_camera(const CameraCalibration& calibration);
 
 /// Each number of the camera, in its units; `before` is that of the camera that was started with.
