@@ -173,7 +173,7 @@ void run(Supervisor& arm, ImageStream& images, Clock& clock, const RunConfig& co
   const Trajectory seen_then{0, features_then, {}};
   const auto ticks = std::lround(duration_s / period_s);
   const BrakesAtTheEnd brakes(arm, clock, controller);
-  bool go_on = true;
+  bool go_on = true, held = false;
   int registration = 0;
   for (long k = 0; k < ticks && go_on;) {
     ControlTick tick;
@@ -182,7 +182,7 @@ void run(Supervisor& arm, ImageStream& images, Clock& clock, const RunConfig& co
     if (images.take_second_sender()) arm.report(Blocked::second_camera);
     tick.input.readings = arm.readings();
     tick.input.joints = arm.state();
-    if (arm.armed())
+    if (arm.armed() && !held)
       since_s = tick.input.time_s - begun_s;
     else if (std::isfinite(tick.input.time_s))
       begun_s = tick.input.time_s - since_s;
@@ -199,6 +199,7 @@ void run(Supervisor& arm, ImageStream& images, Clock& clock, const RunConfig& co
       tips.use(moving->camera_from_rcm(tick.input.time_s));
     }
     tick.decision = servo.step(tick.input);
+    held = tick.decision.control.action == ControlAction::hold;
     if (tick.decision.send) arm.send(servo.path());
     if (tick.decision.release) arm.release();
     tell(arm, tick.decision);

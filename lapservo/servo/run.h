@@ -45,7 +45,7 @@ struct ControlTick {
   bool pursues_tip = false;          ///< the goal is of the tip: its features are those of the registration
   /// Where a goal of the tip was pursued when `seen` was exposed: the seen tip beside it, ideal pixels.
   std::optional<Eigen::Vector2d> tip_error_px{};
-  double trajectory_s = 0;  ///< the trajectory's time, which stands while the supervisor does not move the arm
+  double trajectory_s = 0;  ///< the trajectory's time, which stands while the supervisor or the loop holds the arm
 };
 
 /// Receives every tick after its setpoints were sent, in the loop's thread: a long computation here only delays the
@@ -62,9 +62,10 @@ class RunObserver {
 /// missing or stale image, a lost marker, an outlier or a number that is not finite make it hold within the tick; it
 /// continues by itself when the cause ends within SupervisorConfig::max_loop_hold_s. After anything else it holds until
 /// a start (see SupervisorState), and then until an image shows the instrument. A late tick shifts none of those after
-/// it. The trajectory begins when the arm is armed first, and its time stands while the supervisor does not move the
-/// arm; `duration_s` runs on. Where the endoscope moves it releases the arm, measures camera_from_rcm anew from motion
-/// that the operator makes, and continues after a start.
+/// it. The trajectory begins when the loop moves the arm first, and its time stands while the supervisor or the loop
+/// holds the arm, however shortly: the arm goes on where it left the path; `duration_s` runs on. Where the endoscope
+/// moves it releases the arm, measures camera_from_rcm anew from motion that the operator makes, and continues after a
+/// start.
 ///
 /// Throws InputError before anything moves: without RunConfig::arm_limits where the arm is not simulated; for a
 /// duration or a clock's time that is not finite; for joints or a first image stamped more than a second ahead of the

@@ -226,7 +226,7 @@ void add_trajectory_options(Command command, ServoOptions& options) {
   command.add_option(
       "--trajectory", options.trajectory,
       "paper: section V-D's sinusoids, omega 0.5 read in rad/s; or a CSV of time_s,s_rad,r_px,l_px,d_px, or of the "
-      "tip: time_s,x_m,y_m,z_m with roll_rad or without. Its time stands while the arm is held until a start");
+      "tip: time_s,x_m,y_m,z_m with roll_rad or without. Its time stands while the arm is held");
   command.add_option("--set-point", options.set_point, finite_numbers(4),
                      "Instead: s_rad,r_px,l_px,d_px to reach and keep");
   command.add_option(
