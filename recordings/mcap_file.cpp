@@ -66,6 +66,15 @@ class McapMessages {
     std::uint64_t time_ns = 0;
   };
 
+  // The head of a message's record, without its data.
+  static std::optional<Message> message_taken(ByteView& from) {
+    const auto channel = taken<std::uint16_t>(from);
+    taken<std::uint32_t>(from);  // its sequence number
+    const auto recorded_ns = taken<std::uint64_t>(from), published_ns = taken<std::uint64_t>(from);
+    if (!published_ns) return std::nullopt;
+    return Message{*channel, *recorded_ns};
+  }
+
   // From the record at byte `begin` on. `may_end_early`: `end` may be within a record, as where a recorder was killed;
   // of a chunk there, the whole messages count.
   McapMessages(FileBytes& file, std::uint64_t begin, std::uint64_t end, bool may_end_early)
@@ -96,14 +105,6 @@ class McapMessages {
   bool is_finished() const { return is_finished_; }
 
  private:
-  static std::optional<Message> message_taken(ByteView& from) {
-    const auto channel = taken<std::uint16_t>(from);
-    taken<std::uint32_t>(from);  // its sequence number
-    const auto recorded_ns = taken<std::uint64_t>(from), published_ns = taken<std::uint64_t>(from);
-    if (!published_ns) return std::nullopt;
-    return Message{*channel, *recorded_ns};
-  }
-
   std::optional<Message> next_in_chunk() {
     const auto op = taken<Op>(rest_);
     const auto content = block_taken<std::uint64_t>(rest_);
@@ -188,16 +189,16 @@ class McapMessages {
 
 using ChannelNumbers = std::set<std::uint16_t>;
 
-// A part of a file with messages: all of it, or a chunk.
+// A part of a file with messages: all of it, a chunk, or a message outside of chunks.
 struct Part {
   std::uint64_t begin = 0, end = 0;
-  std::uint64_t first_ns = 0;  // of a chunk
+  std::uint64_t first_ns = 0;  // of a chunk, a message
   ChannelNumbers channels;     // of its messages; empty: not known
 };
 
 struct Contents {
   Part all;
-  std::vector<Part> chunks;  // by their times; none where they are not known
+  std::vector<Part> chunks;  // and messages beside them, by their times; none where no chunks are known
   McapChannels channels;
   std::optional<std::uint64_t> ends_early_at;
 };
@@ -226,13 +227,14 @@ class Summary {
     const auto bytes = file.bytes(*begin, end + record_head + footer_size - sizeof *crc - *begin);
     if (!bytes || !has_mcap_crc(*bytes, *crc)) return std::nullopt;
     Summary summary(*begin);
-    return summary.add_all(ByteView(*bytes).first(end - *begin)) ? std::optional(summary.contents_) : std::nullopt;
+    return summary.add_all(file, ByteView(*bytes).first(end - *begin)) ? std::optional(summary.contents_)
+                                                                       : std::nullopt;
   }
 
  private:
   explicit Summary(std::uint64_t end) : end_(end) { contents_.all = {magic.size(), end, 0, {}}; }
 
-  bool add_all(ByteView from) {
+  bool add_all(FileBytes& file, ByteView from) {
     ByteView statistics;
     while (!from.empty()) {
       const auto op = taken<Op>(from);
@@ -241,10 +243,12 @@ class Summary {
       if (op == Op::chunk_index && !add_chunk(*content)) return false;
       if (op == Op::statistics) statistics = *content;
     }
+    const std::size_t chunks = contents_.chunks.size();
+    if (chunks > 0 && !add_loose(file)) return false;
     std::sort(contents_.chunks.begin(), contents_.chunks.end(), [](const Part& a, const Part& b) {
       return std::pair(a.first_ns, a.begin) < std::pair(b.first_ns, b.begin);
     });
-    return add_counts(statistics);
+    return add_counts(statistics, chunks);
   }
   bool add_chunk(ByteView from) {
     const auto first_ns = taken<std::uint64_t>(from), last_ns = taken<std::uint64_t>(from);
@@ -255,20 +259,48 @@ class Summary {
     while (const auto channel = taken<std::uint16_t>(*indexes)) {
       taken<std::uint64_t>(*indexes);  // where in the chunk
       part.channels.insert(*channel);
-      const auto [times, is_new] = times_.try_emplace(*channel, *first_ns, *last_ns);
-      times->second = {std::min(times->second.first, *first_ns), std::max(times->second.second, *last_ns)};
+      add_times(*channel, *first_ns, *last_ns);
     }
+    ends_[*begin] = part.end + std::min(taken<std::uint64_t>(from).value_or(0), end_ - part.end);
     contents_.chunks.push_back(std::move(part));
     return true;
   }
-  bool add_counts(ByteView from) {
+  // The messages between chunks, which no index has; the format allows them.
+  bool add_loose(FileBytes& file) {
+    ends_.try_emplace(end_, end_);
+    std::uint64_t at = magic.size();
+    for (const auto& [begin, end] : ends_) {
+      while (at < begin) {
+        const auto head = file.bytes(at, std::min(begin - at, record_head + message_head));
+        ByteView from = head ? ByteView(*head) : ByteView();
+        const auto op = taken<Op>(from);
+        const auto size = taken<std::uint64_t>(from);
+        if (!size || *size > begin - at - record_head) return false;
+        Part part{at, at + record_head + *size, 0, {}};
+        at = part.end;
+        if (op != Op::message) continue;
+        const auto message = McapMessages::message_taken(from);
+        if (!message) return false;
+        part.first_ns = message->time_ns, part.channels.insert(message->channel);
+        add_times(message->channel, message->time_ns, message->time_ns);
+        contents_.chunks.push_back(std::move(part));
+      }
+      at = std::max(at, end);
+    }
+    return true;
+  }
+  void add_times(std::uint16_t channel, std::uint64_t first_ns, std::uint64_t last_ns) {
+    const auto [times, is_new] = times_.try_emplace(channel, first_ns, last_ns);
+    times->second = {std::min(times->second.first, first_ns), std::max(times->second.second, last_ns)};
+  }
+  bool add_counts(ByteView from, std::size_t indexed) {
     const auto messages = taken<std::uint64_t>(from);
     taken<std::uint16_t>(from);                 // schemas
     taken<std::array<std::uint32_t, 3>>(from);  // channels, attachments, metadata
     const auto chunks = taken<std::uint32_t>(from);
     const auto first_ns = taken<std::uint64_t>(from), last_ns = taken<std::uint64_t>(from);
     auto counts = block_taken(from);
-    if (!counts || *chunks != contents_.chunks.size() || (counts->empty() && *messages > 0)) return false;
+    if (!counts || *chunks != indexed || (counts->empty() && *messages > 0)) return false;
     while (const auto channel = taken<std::uint16_t>(*counts)) {
       const auto counted = taken<std::uint64_t>(*counts);
       const auto topic = contents_.channels.topics.find(*channel);
@@ -282,6 +314,7 @@ class Summary {
 
   std::uint64_t end_;  // of the messages
   Contents contents_;
+  std::map<std::uint64_t, std::uint64_t> ends_;  // of chunks with their indexes, by where they begin
   std::map<std::uint16_t, std::pair<std::uint64_t, std::uint64_t>> times_;
 };
 
@@ -299,8 +332,8 @@ Contents found_by_reading(FileBytes& file) {
   return contents;
 }
 
-// The messages of chunks in the order of their times. Chunks may overlap in time, so each is read when a message of it
-// may be the next.
+// The messages of chunks and beside them in the order of their times. Chunks may overlap in time, so each is read when
+// a message of it may be the next.
 class IndexedMessages {
  public:
   IndexedMessages(const std::string& path, std::vector<Part> chunks, ChannelNumbers channels)

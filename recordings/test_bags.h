@@ -40,6 +40,7 @@ struct McapLayout {
   std::string compression;           ///< "", "lz4" or "zstd"
   std::size_t messages_a_chunk = 3;  ///< 0: no chunks
   bool with_summary = true, with_checksums = true;
+  std::size_t loose_every = 0;  ///< of so many messages one stands outside of chunks; 0: none
 };
 /// An MCAP file as its specification has it, by code that shares nothing with the reader.
 void write_mcap(const std::filesystem::path& path, const std::vector<BagEntry>& entries, const McapLayout& layout = {});

@@ -65,11 +65,14 @@ class Writer {
     }
     const auto time_ns = static_cast<std::uint64_t>(std::llround(1e9 * entry.time_s));
     const Text time = number(time_ns, 8);
-    if (layout_.messages_a_chunk > 0) indexes_[found->second] += time + number(chunk_.size() + records.size(), 8);
+    const bool loose =
+        layout_.messages_a_chunk == 0 || (layout_.loose_every > 0 && sequence_ % layout_.loose_every == 0);
+    if (loose && !chunk_.empty()) end_chunk();
+    if (!loose) indexes_[found->second] += time + number(chunk_.size() + records.size(), 8);
     records += record(5, id + number(++sequence_, 4) + time + time + Text(entry.bytes.begin(), entry.bytes.end()));
     ++counts_[found->second];
     first_ns_ = std::min(first_ns_, time_ns), last_ns_ = std::max(last_ns_, time_ns);
-    if (layout_.messages_a_chunk == 0) return write(records);
+    if (loose) return write(records);
     if (chunk_.empty()) chunk_first_ns_ = chunk_last_ns_ = time_ns;
     chunk_first_ns_ = std::min(chunk_first_ns_, time_ns), chunk_last_ns_ = std::max(chunk_last_ns_, time_ns);
     chunk_ += records;
