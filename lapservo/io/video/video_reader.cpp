@@ -196,6 +196,7 @@ class Video : public FrameSource {
     while ((read = av_read_frame(format_.get(), packet_.get())) >= 0) {
       const bool ours = packet_->stream_index == stream_->index;
       look_at_end(*packet_);
+      if (ours) packet_stamp_ = (packet_->flags & AV_PKT_FLAG_DISCARD) != 0 ? AV_NOPTS_VALUE : packet_->pts;
       if (ours && packets_++ == 0) of_software_ = names_software();
       if (ours && (packet_->flags & AV_PKT_FLAG_CORRUPT) != 0) tainted_ = true;
       if (ours && stream_->codecpar->codec_id == AV_CODEC_ID_MJPEG) check_jpeg_packet();
@@ -257,7 +258,7 @@ class Video : public FrameSource {
     spoiled_ = true;
     if (last_.empty())
       last_ = cv::Mat::zeros(std::max(1, stream_->codecpar->height), std::max(1, stream_->codecpar->width), CV_8UC3);
-    advance(AV_NOPTS_VALUE, 0);
+    advance(stamped_ ? AV_NOPTS_VALUE : packet_stamp_, 0);  // its packet may be a later frame's once frames have come
     return counted(true, last_.clone());
   }
   Frame counted(bool damaged, const cv::Mat& bgr) {
@@ -265,7 +266,8 @@ class Video : public FrameSource {
     return {bgr, frames_++, time_s_.value_or(0), {}, damaged ? std::optional(Status::damaged) : std::nullopt};
   }
 
-  // Frames that the container gives no time, or none later than the frame before, follow at the stream's rate.
+  // The first stamp is where times begin, be its frame lost. Frames that the container gives no time, or none later
+  // than the frame before, follow at the stream's rate.
   void advance(std::int64_t stamp, std::int64_t duration) {
     const double unit_s = av_q2d(stream_->time_base), period_s = 1 / frames_per_second();
     const double by_rate_s = time_s_ ? *time_s_ + period_s : 0;
@@ -351,6 +353,7 @@ class Video : public FrameSource {
   double end_of_all_s_ = 0;       // of all streams, where they have one duration
   double first_s_ = 0;            // the first frame's stamp
   bool stamped_ = false;          // a frame had a stamp
+  std::int64_t packet_stamp_ = AV_NOPTS_VALUE;
   int packets_ = 0, frames_ = 0, damaged_ = 0;
   int tracks_ = 0;        // of video
   bool tainted_ = false;  // a packet since the last frame was damaged on its way

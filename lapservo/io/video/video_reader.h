@@ -15,7 +15,7 @@ inline constexpr auto ignored_colours_text =
 /// The frames of a video file or, live, of a stream (rtsp://...), by FFmpeg's libraries: OpenCV hides what their
 /// decoders complain of. Damaged are those that the decoder complained of, or that were predicted from such a one; in
 /// place of a frame that can't be decoded at all comes the one before (or black). Times are those of the container's
-/// stamps; where it has none, they go by the rate.
+/// stamps since its first frame, be that damaged; where it has none, they go by the rate.
 ///
 /// Throws InputError when it holds no video that can be decoded, or one with an orientation for display: a calibration
 /// belongs to the pixels in one orientation, and it is unknown which. `patience` bounds the time of opening, not that

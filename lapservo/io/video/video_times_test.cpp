@@ -44,6 +44,21 @@ TEST(VideoTimes, AreTheContainersWhereFramesWereDropped) {
   }
 }
 
+TEST(VideoTimes, BeginWithAFirstFrameThatCanNotBeDecoded) {
+  const testing::TemporaryFolder folder;
+  const auto path = folder / "a.mkv";
+  if (!ffmpeg("-f lavfi -i testsrc=s=64x48:r=25:d=1 -vf \"select='not(between(n,1,9))'\" -vsync vfr -c:v mjpeg " +
+              path.string()))
+    GTEST_SKIP() << "no ffmpeg";
+  std::string bytes = testing::read_file(path);
+  bytes.at(bytes.find("\xff\xc0", bytes.find("\xff\xd8\xff")) + 1) = '\xed';  // no frame header
+  testing::write_file(path, bytes);
+  const TimesRead times = read_times(path);
+  ASSERT_EQ(times.s.size(), 16U);
+  for (std::size_t i = 0; i < times.s.size(); ++i)
+    EXPECT_NEAR(times.s[i], i == 0 ? 0 : 0.36 + 0.04 * static_cast<double>(i), 1.01e-3) << "frame " << i;
+}
+
 TEST(VideoTimes, AreWrittenAsTheyAreRead) {
   const testing::TemporaryFolder folder;
   const std::vector<double> times{0, 0.04, 0.5, 0.533, 2};
