@@ -27,10 +27,9 @@ struct Pictures {
   int unread = 0;  ///< beside them, of formats that are not read
 };
 
-// The first file's; a folder's are alike.
-std::optional<Transfer> transfer_in(const std::vector<fs::path>& files) {
+std::optional<Transfer> transfer_in(const fs::path& path) {
   std::vector<std::uint8_t> head(std::size_t{1} << 16);
-  std::ifstream file(files.front(), std::ios::binary);
+  std::ifstream file(path, std::ios::binary);
   file.read(reinterpret_cast<char*>(head.data()), static_cast<std::streamsize>(head.size()));
   head.resize(static_cast<std::size_t>(file.gcount()));
   return png_transfer(head);
@@ -55,7 +54,7 @@ class PictureSource : public FrameSource {
   PictureSource(Kind kind, Pictures pictures, double fps)
       : kind_(kind),
         files_(std::move(pictures.order.files)),
-        transfer_(transfer_in(files_)),
+        transfer_(transfer_in(files_.front())),
         remark_(remark_on(pictures, files_, transfer_)),
         fps_(fps) {}
 
@@ -63,6 +62,10 @@ class PictureSource : public FrameSource {
     if (next_ == files_.size()) return std::nullopt;
     const fs::path& file = files_[next_];
     Picture picture = read_picture(file);
+    if (const auto transfer = transfer_in(file); !picture.flaw && transfer != transfer_)
+      throw InputError(file.string(), "transfer", name_of(transfer),
+                       fmt::format("{} as in {}: put the images of each encoding into a folder of its own",
+                                   name_of(transfer_), files_.front().filename().string()));
     Frame frame{std::move(picture.bgr), static_cast<int>(next_), static_cast<double>(next_) / fps_, file, picture.flaw};
     ++next_;
     low_bits_ += picture.low_bits;

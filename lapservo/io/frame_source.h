@@ -26,7 +26,8 @@ class FrameSource {
   enum class Kind { image, folder, video, live };
 
   virtual ~FrameSource() = default;
-  /// nullopt at the end. Throws InputError for an image that can't be read.
+  /// nullopt at the end. Throws InputError for an image that can't be read, or that names another encoding of light
+  /// than the folder's first one.
   virtual std::optional<Frame> next() = 0;
   virtual Kind kind() const = 0;
   /// Where it is known beforehand.

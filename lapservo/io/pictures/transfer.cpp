@@ -39,12 +39,6 @@ double light_of(double value, const Transfer& transfer) {
   return value;
 }
 
-std::string name_of(const Transfer& transfer) {
-  if (transfer.kind == Transfer::Kind::hlg) return "HLG";
-  if (transfer.kind == Transfer::Kind::pq) return "PQ";
-  return transfer.gamma == 1 ? "linear light" : fmt::format("gamma {:.2f}", transfer.gamma);
-}
-
 }  // namespace
 
 std::optional<Transfer> transfer_of_code(int code) {
@@ -52,6 +46,13 @@ std::optional<Transfer> transfer_of_code(int code) {
   if (code == hlg) return Transfer{Transfer::Kind::hlg};
   if (code == pq) return Transfer{Transfer::Kind::pq};
   return code == linear ? std::optional(Transfer{}) : std::nullopt;
+}
+
+std::string name_of(const std::optional<Transfer>& transfer) {
+  if (!transfer) return "a camera's";
+  if (transfer->kind == Transfer::Kind::hlg) return "HLG";
+  if (transfer->kind == Transfer::Kind::pq) return "PQ";
+  return transfer->gamma == 1 ? "linear light" : fmt::format("gamma {:.2f}", transfer->gamma);
 }
 
 std::string remark_on_transfer(const Transfer& transfer) {

@@ -19,6 +19,9 @@ struct Transfer {
 /// response describes.
 std::optional<Transfer> transfer_of_code(int code);
 
+/// "HLG", "gamma 2.60"; "a camera's" without one.
+std::string name_of(const std::optional<Transfer>& transfer);
+
 /// That it is undone.
 std::string remark_on_transfer(const Transfer& transfer);
 

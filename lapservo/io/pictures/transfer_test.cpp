@@ -170,6 +170,22 @@ TEST(Transfer, OfAPngIsUndone) {
   }
 }
 
+TEST(Transfer, OfALaterImageIsThatOfTheFirst) {
+  const testing::TemporaryFolder folder;
+  const auto plain = encode_png(srgb_patches());
+  const auto refused = [&](const std::vector<std::uint8_t>& later) {
+    const auto first = with_chunk(plain, "gAMA", gamma_chunk(1.8));
+    testing::write_file(folder / "1.png", {reinterpret_cast<const char*>(first.data()), first.size()});
+    testing::write_file(folder / "2.png", {reinterpret_cast<const char*>(later.data()), later.size()});
+    const auto source = open_frame_source(folder.path().string(), 25);
+    EXPECT_TRUE(source->next());
+    return testing::input_error([&] { source->next(); });
+  };
+  EXPECT_EQ(refused(with_chunk(plain, "gAMA", gamma_chunk(1.8))), "");
+  EXPECT_NE(refused(plain).find("2.png: transfer: is a camera's, expected gamma 1.80 as in 1.png"), std::string::npos);
+  EXPECT_NE(refused(with_chunk(plain, "cICP", {9, 18, 0, 1})).find("is HLG, expected gamma 1.80"), std::string::npos);
+}
+
 TEST(Transfer, OfAPngThatSaysWhatCamerasDoIsTheRigs) {
   const auto plain = encode_png(srgb_patches());
   for (const auto& bytes : {with_chunk(plain, "gAMA", gamma_chunk(2.2)), with_chunk(plain, "gAMA", {0, 0, 0, 0}),
