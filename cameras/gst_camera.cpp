@@ -135,14 +135,7 @@ class GstCamera : public LiveCamera {
   }
   ~GstCamera() override { gst_element_set_state(pipeline_.get(), GST_STATE_NULL); }
 
-  std::optional<std::string> ended() const override {
-    const Owned<GstBus> bus(gst_element_get_bus(pipeline_.get()));
-    const std::lock_guard lock(mutex_);
-    constexpr auto last = static_cast<GstMessageType>(GST_MESSAGE_ERROR | GST_MESSAGE_EOS);
-    const std::unique_ptr<GstMessage, Unref<gst_message_unref>> message(gst_bus_pop_filtered(bus.get(), last));
-    if (message && !ended_) ended_ = end_of(message.get());
-    return ended_;
-  }
+  std::optional<std::string> ended() const override { return ended_within(0); }
 
   std::optional<StampedImage> take(std::chrono::milliseconds patience) override {
     StampedImage image;
@@ -164,6 +157,17 @@ class GstCamera : public LiveCamera {
   }
 
  private:
+  // Waits so long where no end is known yet.
+  std::optional<std::string> ended_within(GstClockTime patience) const {
+    const Owned<GstBus> bus(gst_element_get_bus(pipeline_.get()));
+    const std::lock_guard lock(mutex_);
+    constexpr auto last = static_cast<GstMessageType>(GST_MESSAGE_ERROR | GST_MESSAGE_EOS);
+    const std::unique_ptr<GstMessage, Unref<gst_message_unref>> message(
+        gst_bus_timed_pop_filtered(bus.get(), ended_ ? 0 : patience, last));
+    if (message && !ended_) ended_ = end_of(message.get());
+    return ended_;
+  }
+
   GstAppSink* app_sink() const { return GST_APP_SINK(sink_element_.get()); }
 
   void parse() {
@@ -210,8 +214,9 @@ class GstCamera : public LiveCamera {
       if (changed == GST_STATE_CHANGE_ASYNC && !ended().value_or("").empty()) break;
     }
     if (changed == GST_STATE_CHANGE_FAILURE || changed == GST_STATE_CHANGE_ASYNC) {
-      const std::string why = ended().value_or("");
+      // An element that has failed may be about to say why in its own thread, which waits for a busy computer alone.
       const bool late = changed == GST_STATE_CHANGE_ASYNC;
+      const std::string why = ended_within(late ? 0 : GST_SECOND).value_or("");
       refuse(!why.empty() ? why : late ? "none came within 10 s" : "it does not start", expectation());
     }
     return changed;

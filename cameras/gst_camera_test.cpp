@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <chrono>
+#include <gst/gst.h>
 #include <mutex>
 #include <string>
 #include <thread>
@@ -121,6 +122,34 @@ TEST(GstCamera, WhatGivesNoImagesIsRefusedInOneLine) {
       EXPECT_NE(refusal.find(part), std::string::npos) << one.camera << ": " << refusal;
     EXPECT_EQ(refusal.find('\n'), std::string::npos) << refusal;
   }
+}
+
+// A source that fails at once, and says why 0.2 s later in another thread.
+std::thread late_reason;
+GstStateChangeReturn fail(GstElement* element, GstStateChange change) {
+  if (change != GST_STATE_CHANGE_NULL_TO_READY) return GST_STATE_CHANGE_SUCCESS;
+  gst_object_ref(element);
+  late_reason = std::thread([element] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    GST_ELEMENT_ERROR(element, RESOURCE, BUSY, ("another program uses it"), (nullptr));
+    gst_object_unref(element);
+  });
+  return GST_STATE_CHANGE_FAILURE;
+}
+
+TEST(GstCamera, TheReasonOfAFailureIsWaitedFor) {
+  ASSERT_TRUE(gst_init_check(nullptr, nullptr, nullptr));
+  GstElement* const usual = gst_element_factory_make("videotestsrc", nullptr);
+  GTypeQuery type;
+  g_type_query(G_OBJECT_TYPE(usual), &type);
+  const auto change = [](gpointer made, gpointer) { GST_ELEMENT_CLASS(made)->change_state = fail; };
+  const GType late = g_type_register_static_simple(type.type, "LapservoLate", type.class_size, change,
+                                                   type.instance_size, nullptr, GTypeFlags(0));
+  ASSERT_TRUE(gst_element_register(nullptr, "lapservolate", GST_RANK_NONE, late));
+  gst_object_unref(usual);
+  const std::string refusal = testing::input_error([] { open_camera("gst:lapservolate", {}); });
+  late_reason.join();
+  EXPECT_NE(refusal.find("another program uses it"), std::string::npos) << refusal;
 }
 
 TEST(CameraFrames, AreAllOfAFileAndEndWithIt) {
