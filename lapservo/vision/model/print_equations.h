@@ -56,7 +56,8 @@ struct GroupPull {
 };
 
 /// The effect of one sigma of a number of the rig's camera or marker on the measurements of all groups.
-struct CameraPull : GroupPull {
+struct RigPull : GroupPull {
+  bool of_print = false;
   std::array<double, measurement_groups> by_group{};  ///< sums of weights times what it moves
 };
 
@@ -65,11 +66,14 @@ struct PrintSums {
   PrintEquations equations;
   std::array<GroupPull, measurement_groups> pulls;
   InplaceVector<GroupPull, 3> of_all_boundaries;
-  InplaceVector<CameraPull, RigErrors::most> camera;
+  InplaceVector<RigPull, RigErrors::most> rig;
 };
 
 /// Weighted robustly about the errors' lines. `film_prior` as the fit has it.
 PrintSums print_sums(std::span<const Measurement> measurements, double film_prior, const CommonErrors& errors);
+
+/// The same of a print that is known exactly.
+PrintSums of_exact_print(PrintSums sums);
 
 /// The same of a shaft that is held at the RCM.
 PrintSums held(PrintSums sums, const RcmMeasurement& rcm);
