@@ -25,9 +25,23 @@ double sigma_of_sum(const Eigen::VectorXd& of_groups, std::size_t alike) {
 }
 
 struct Estimate {
-  double size = 0, sigma = 1;
+  double size = 0, sigma = 1, clear_sigma = 1;
   double sigmas() const { return std::abs(size) / sigma; }
+  bool is_clear() const { return std::abs(size) > seen_sigmas * clear_sigma; }
 };
+
+// Standard deviation of a fault's size by all that may put it off: the scatter of the groups, errors that are alike,
+// priors. `sigma`: by the scatter alone.
+double clear_sigma(const LinearFit& fit, const Eigen::VectorXd& left, double sigma) {
+  const Eigen::Index first = fit.groups.front(), rows = fit.groups.back() - first;
+  double variance = left.head(first).squaredNorm() + left.tail(left.size() - first - rows).squaredNorm();
+  if (fit.alike.size() == rows) {
+    // As large as errors of this size may be together where they go as the fault does.
+    const Eigen::VectorXd moved = fit.alike.cwiseSign().cwiseAbs().cwiseProduct(left.segment(first, rows));
+    variance += fit.alike.squaredNorm() * moved.squaredNorm();
+  }
+  return std::hypot(std::sqrt(fit.freedom) * sigma, std::sqrt(variance) / left.squaredNorm());
+}
 
 // One fault by the slopes that x leaves of it; 0 with a sigma of 1 where it can't be distinguished from x.
 Estimate estimate(const LinearFit& fit, const Eigen::VectorXd& residuals, const Eigen::VectorXd& left,
@@ -35,7 +49,10 @@ Estimate estimate(const LinearFit& fit, const Eigen::VectorXd& residuals, const 
   const double squares = left.squaredNorm();
   if (!(squares > least_left * slopes_squared)) return {};
   const double size = -left.dot(residuals) / squares;
-  if (fit.noise > 0) return {size, fit.unmodelled_sigmas * fit.noise / std::sqrt(squares)};
+  if (fit.noise > 0) {
+    const double sigma = fit.unmodelled_sigmas * fit.noise / std::sqrt(squares);
+    return {size, sigma, sigma};
+  }
   Eigen::VectorXd gradients(static_cast<Eigen::Index>(fit.groups.size()) - 1);
   for (Eigen::Index g = 0; g < gradients.size(); ++g) {
     const Eigen::Index first = fit.groups[static_cast<std::size_t>(g)],
@@ -43,7 +60,8 @@ Estimate estimate(const LinearFit& fit, const Eigen::VectorXd& residuals, const 
     const auto part = left.segment(first, rows);
     gradients[g] = part.dot(residuals.segment(first, rows) + size * part);
   }
-  return {size, std::max(1e-300, fit.unmodelled_sigmas * sigma_of_sum(gradients, fit.alike_groups) / squares)};
+  const double sigma = std::max(1e-300, fit.unmodelled_sigmas * sigma_of_sum(gradients, fit.alike_groups) / squares);
+  return {size, sigma, clear_sigma(fit, left, sigma)};
 }
 
 // The part of the slopes of faults that x leaves, and the displacement of x by a size of 1 of each.
@@ -93,8 +111,9 @@ Departures departures_of(const LinearFit& fit, const Eigen::MatrixXd& slopes) {
       if (!is_seen[k] && estimates[k].sigmas() > (clearest ? estimates[*clearest].sigmas() : seen_sigmas)) clearest = k;
     if (!clearest) break;
     const auto column = static_cast<Eigen::Index>(*clearest);
-    const auto [size, sigma] = estimates[*clearest];
-    is_seen[*clearest] = true, result.seen.push_back({*clearest, size, sigma});
+    const Estimate& one = estimates[*clearest];
+    const double size = one.size;
+    is_seen[*clearest] = true, result.seen.push_back({*clearest, size, one.sigma, one.is_clear()});
     bias += size * beside.displacements.col(column), residuals += size * beside.left.col(column);
     beside.add_to_x(column);
     estimates = estimates_beside();
@@ -110,7 +129,7 @@ Departures departures_of(const LinearFit& fit, const Eigen::MatrixXd& slopes) {
     if (is_seen[k]) result.by_seen += variance * squares;
     if (!instead) continue;
     // As large as it would be, as far as the residuals allow that beside those that are seen.
-    result.instead.push_back({k, alone[k].size, alone[k].sigma});
+    result.instead.push_back({k, alone[k].size, alone[k].sigma, alone[k].is_clear()});
     const double prior = std::pow(alone[k].size, 2), known = prior / (prior + variance);
     result.by_instead += (known * variance + std::pow(known * estimates[k].size, 2)) * squares;
   }

@@ -22,6 +22,10 @@ struct LinearFit {
   std::size_t alike_groups = 1;      ///< over so many neighbouring groups noise stays alike
   double noise = 0;                  ///< sigma of residuals that are independent; 0: by the scatter of the groups
   double unmodelled_sigmas = 1;      ///< how many times as far off as the residuals' scatter makes it a number may be
+  double freedom = 1;                ///< times the scatter's variance: what a fit to few groups takes away from it
+  /// Of each residual in the groups: how far it may be off alike wherever a fault moves it, so that it does not average
+  /// out. Empty: not at all.
+  Eigen::VectorXd alike{};
   std::size_t most_seen = 4;
 };
 
@@ -29,6 +33,9 @@ struct LinearFit {
 struct Fault {
   std::size_t which;
   double size, sigma;
+  /// Beyond chance also with `freedom`, `alike` and the residuals outside of the groups, which are priors with a sigma
+  /// of 1. What is seen without that may be there, so sigmas count it; it is no cause to name.
+  bool is_clear = true;
 };
 
 /// How far data depart from a model.

@@ -2,6 +2,9 @@
 
 #include <cmath>
 #include <cstdint>
+#include <functional>
+#include <utility>
+#include <vector>
 
 #include <Eigen/Dense>
 #include <gtest/gtest.h>
@@ -68,6 +71,39 @@ TEST(Departures, SeesSeldomAFaultWhereThereIsNone) {
       EXPECT_TRUE(!departures.seen.empty() || departures.by_seen.norm() == 0);
     }
   EXPECT_LT(seen, 0.04 * 2 * fits);  // 6 faults beyond 3 sigmas: 1.6 %
+}
+
+// A prior on a number of x that does what the fault does.
+void hold_by_prior(Fitted& fitted, double inverse_sigma) {
+  Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(rows + 1, numbers + 1);
+  jacobian.topLeftCorner(rows, numbers) = Eigen::MatrixXd(fitted.fit.jacobian);
+  jacobian.col(numbers).head(rows) = fitted.slopes.col(1);
+  jacobian(rows, numbers) = inverse_sigma;
+  Eigen::VectorXd data = Eigen::VectorXd::Zero(rows + 1);
+  data.head(rows) = fitted.fit.residuals;
+  fitted.fit.residuals = data - jacobian * jacobian.householderQr().solve(data);
+  fitted.fit.jacobian = jacobian.sparseView();
+  fitted.slopes.conservativeResizeLike(Eigen::MatrixXd::Zero(rows + 1, faults));
+}
+
+// A fault of 1 is seen beyond the scatter at 16 sigmas. It is clear where nothing else makes as much.
+TEST(Departures, AreClearWhereNothingElseMakesThem) {
+  const std::vector<std::pair<std::function<void(Fitted&)>, bool>> cases{
+      {[](Fitted&) {}, true},
+      {[](Fitted& fitted) { fitted.fit.alike = Eigen::VectorXd::Constant(rows, 0.1); }, true},
+      {[](Fitted& fitted) { fitted.fit.alike = Eigen::VectorXd::Constant(rows, 0.5); }, false},
+      {[](Fitted& fitted) { fitted.fit.freedom = 2; }, true},
+      {[](Fitted& fitted) { fitted.fit.freedom = 300; }, false},
+      {[](Fitted& fitted) { hold_by_prior(fitted, 30); }, true},
+      {[](Fitted& fitted) { hold_by_prior(fitted, 1); }, false}};
+  for (const auto& [with, is_clear] : cases) {
+    Fitted fitted(sizes_with({{1, 1.0}}), 3, false);
+    with(fitted);
+    const Departures departures = departures_of(fitted.fit, fitted.slopes);
+    ASSERT_FALSE(departures.seen.empty());
+    EXPECT_EQ(departures.seen[0].which, 1U);
+    EXPECT_EQ(departures.seen[0].is_clear, is_clear);
+  }
 }
 
 TEST(Departures, OfTwoThatLookAlikeOneIsInsteadOfTheOther) {

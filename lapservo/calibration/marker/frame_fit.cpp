@@ -116,6 +116,12 @@ Eigen::VectorXd robust_scales(const Eigen::MatrixXd& residuals) {
   return scales;
 }
 
+// The fit and the window of lags take a part of the scatter away: times its variance.
+double freedom_of(Eigen::Index frames, Eigen::Index numbers, std::size_t alike_frames) {
+  const double taken = static_cast<double>(numbers) + static_cast<double>(alike_frames);
+  return static_cast<double>(frames) / std::max(1.0, static_cast<double>(frames) - taken);
+}
+
 struct Covariances {
   Eigen::MatrixXd scattered, independent;
 };
@@ -147,21 +153,21 @@ std::optional<Covariances> covariances(const Linearisation& at, const Eigen::Vec
     scatter += weight * (shifted + shifted.transpose());
   }
   scatter.diagonal() += priors;
-  // The fit and the window of lags take a part of the scatter away.
-  const double taken = static_cast<double>(numbers) + static_cast<double>(alike_frames);
-  const double freedom = static_cast<double>(frames) / std::max(1.0, static_cast<double>(frames) - taken);
   const Eigen::MatrixXd inverse = units.asDiagonal() * inverse_of_symmetric(normed) * units.asDiagonal();
+  const double freedom = freedom_of(frames, numbers, alike_frames);
   return Covariances{freedom * product(product(inverse, scatter), inverse), inverse};
 }
 
 // By the numbers that are held.
-Departures departures_at(const Linearisation& at, const Eigen::VectorXd& weights, std::size_t alike_frames) {
+Departures departures_at(const Linearisation& at, const Eigen::VectorXd& weights, std::size_t alike_frames,
+                         const Eigen::VectorXd& alike) {
   const Eigen::Index channels = at.residuals.rows(), frames = at.residuals.cols(), numbers = at.x.size(),
                      rows = channels * frames;
   const double scale = loss_scale(channels);
   LinearFit fit;
   fit.residuals = Eigen::VectorXd::Zero(rows + numbers);
   fit.alike_groups = alike_frames, fit.unmodelled_sigmas = unmodelled_sigmas;
+  fit.freedom = freedom_of(frames, numbers, alike_frames);
   Eigen::MatrixXd jacobian(rows + numbers, numbers), weighed(channels, frames);
   for (Eigen::Index i = 0; i < frames; ++i) {
     const Eigen::VectorXd residual = weights.cwiseProduct(at.residuals.col(i));
@@ -171,6 +177,7 @@ Departures departures_at(const Linearisation& at, const Eigen::VectorXd& weights
     jacobian.middleRows(channels * i, channels) = weighed.col(i).asDiagonal() * at.jacobian(i);
   }
   fit.groups.push_back(rows);
+  if (alike.size() == channels) fit.alike = (alike.asDiagonal() * weighed).reshaped();
   const Eigen::VectorXd priors = inverse_priors(at.unknowns, numbers);
   jacobian.bottomRows(numbers) = priors.asDiagonal(), fit.residuals.tail(numbers) = priors.cwiseProduct(at.x);
   fit.jacobian = jacobian.sparseView();
@@ -189,7 +196,8 @@ Block add_block(std::vector<Unknown>& unknowns, const std::vector<Unknown>& adde
 }
 
 std::optional<FrameFit> fit_frames(const FrameResiduals& residuals, const std::vector<Unknown>& unknowns,
-                                   std::size_t alike_frames, const AtIteration& at_iteration, std::size_t held) {
+                                   std::size_t alike_frames, const AtIteration& at_iteration, std::size_t held,
+                                   const Eigen::VectorXd& alike) {
   Eigen::VectorXd starts(static_cast<Eigen::Index>(unknowns.size()));
   for (std::size_t i = 0; i < unknowns.size(); ++i) starts[static_cast<Eigen::Index>(i)] = unknowns[i].start;
   Linearisation at(residuals, unknowns, starts, held);
@@ -207,7 +215,7 @@ std::optional<FrameFit> fit_frames(const FrameResiduals& residuals, const std::v
   const auto sigma = covariances(at, scales.cwiseInverse(), alike_frames);
   if (!sigma || !sigma->scattered.allFinite() || !sigma->independent.allFinite()) return std::nullopt;
   return FrameFit{at.x,         sigma->scattered, sigma->independent,
-                  at.residuals, scales,           departures_at(at, scales.cwiseInverse(), alike_frames)};
+                  at.residuals, scales,           departures_at(at, scales.cwiseInverse(), alike_frames, alike)};
 }
 
 }  // namespace lapservo::internal

@@ -45,11 +45,12 @@ Block add_block(std::vector<Unknown>& unknowns, const std::vector<Unknown>& adde
 
 /// Least squares over frames with Cauchy's loss (Ceres). Channels are weighed by their own scatter. The covariance
 /// holds for residuals that stay alike over `alike_frames` neighbouring ones (Newey and West 1987). The last
-/// `held` unknowns stay as they start and are no part of x and the covariances. Nullopt when the solver fails or the
-/// residuals leave a number open.
+/// `held` unknowns stay as they start and are no part of x and the covariances. `alike`: of each channel, the part of a
+/// frame's standard deviation that may be alike in frames that show the same; it keeps faults from being clear. Nullopt
+/// when the solver fails or the residuals leave a number open.
 std::optional<FrameFit> fit_frames(const FrameResiduals& residuals, const std::vector<Unknown>& unknowns,
-                                   std::size_t alike_frames, const AtIteration& at_iteration = {},
-                                   std::size_t held = 0);
+                                   std::size_t alike_frames, const AtIteration& at_iteration = {}, std::size_t held = 0,
+                                   const Eigen::VectorXd& alike = {});
 
 /// Times sigma: what goes with the pose (the side of the marker that is seen, a codec's habits) is neither noise nor
 /// common to all frames, and in no covariance. On rendered motions it doubles the errors (docs/notes/decisions.md).

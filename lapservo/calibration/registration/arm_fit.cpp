@@ -171,8 +171,12 @@ std::optional<ArmFit> fit_model(const Instrument& instrument, const ArmStart& st
   ArmFaults faults = free;
   faults.joints.insert(faults.joints.end(), held.begin(), held.end());
   ArmModel model(instrument, start, recording, faults);
+  // The scale and the tilt are numbers of the model. Nothing in it is the roll that follows the side of the print and
+  // the place in the image, as in compressed video: it is up to the half of a frame's error that is no noise.
+  Eigen::VectorXd alike = Eigen::VectorXd::Zero(6);
+  alike[5] = common_roll_part;
   auto fit = fit_frames([&](const Eigen::VectorXd& x) { return model.residuals(x); }, model.unknowns(),
-                        2 * poses_per_second(start.poses), at_iteration, held.size());
+                        2 * poses_per_second(start.poses), at_iteration, held.size(), alike);
   if (!fit || !is_backlash(model.backlash_of(fit->x), start.ranges)) return std::nullopt;
   return ArmFit{std::move(model), std::move(*fit), {}, {}, {}};
 }
@@ -288,7 +292,8 @@ std::optional<ArmFit> fit_arm(const Instrument& instrument, const ArmStart& star
                        bias * bias.transpose() + without.by_instead;
   for (std::size_t k = free.joints.size(); k < with.joints.size(); ++k) {
     const double size = fit.x[joints + static_cast<Eigen::Index>(k)];
-    if (std::abs(size) > with.joints[k].least) result->faults.push_back(with.joints[k].text(size));
+    const bool is_clear = without.seen[k - free.joints.size()].is_clear;
+    if (is_clear && std::abs(size) > with.joints[k].least) result->faults.push_back(with.joints[k].text(size));
   }
   return result;
 }
@@ -309,7 +314,8 @@ std::string explaining_fault(const Instrument& instrument, const std::vector<Tim
   if (!best) return {};
   const double left = best->noise.maxCoeff();
   const auto without = fit ? std::optional(fit->noise) : explainer.noise_without();
-  const bool gains = !without || without->cwiseQuotient(best->noise).maxCoeff() > least_gain;
+  // Residuals within the frames' own sigmas are no misfit: less than those explains nothing.
+  const bool gains = !without || without->cwiseMax(1).cwiseQuotient(best->noise.cwiseMax(1)).maxCoeff() > least_gain;
   const bool is_little = left < most_left || (fit && left < most_part_left * fit->noise.maxCoeff());
   return gains && is_little ? best->text : std::string();
 }

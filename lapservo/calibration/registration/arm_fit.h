@@ -19,6 +19,9 @@ struct ArmFaults {
   std::vector<JointFault> joints{};  ///< with a size
 };
 
+/// The part of a frame's error of the roll that is the film's, the print's and the image's processing, and no noise.
+inline constexpr double common_roll_part = 0.5;
+
 /// Where a marker is seen, as its arm's joints have it.
 class ArmModel {
  public:
@@ -75,8 +78,9 @@ struct ArmFit {
   FrameFit fit;
   /// Covariance of fit.x, with the square of its displacement by faults of the readings that show.
   Eigen::MatrixXd covariance;
-  Eigen::VectorXd noise;            ///< how many times the poses' own sigmas the residuals are, by channel
-  std::vector<std::string> faults;  ///< of the readings, that show, in words; the clearest first
+  Eigen::VectorXd noise;  ///< how many times the poses' own sigmas the residuals are, by channel
+  /// Of the readings, that show more clearly than what frames of this quality may feign, in words; the clearest first.
+  std::vector<std::string> faults;
 };
 
 /// `free`: faults that are fitted beside the registration. Nullopt where the motion leaves a number open, and where it

@@ -52,7 +52,8 @@ Eigen::Vector2d miss(TimedPose pose, double part_of_time, const Eigen::VectorXd&
 std::vector<std::string> texts_of(const std::vector<Fault>& seen) {
   constexpr double least_m = 0.1e-3, least_rad = 5e-3;
   Eigen::VectorXd sizes = Eigen::VectorXd::Zero(numbers);
-  for (const Fault& fault : seen) sizes[3 + static_cast<Eigen::Index>(fault.which)] = fault.size;
+  for (const Fault& fault : seen)
+    if (fault.is_clear) sizes[3 + static_cast<Eigen::Index>(fault.which)] = fault.size;
   std::vector<std::string> texts;
   if (const double moved_m = sizes.segment<3>(motion).norm(); moved_m > least_m)
     texts.push_back(

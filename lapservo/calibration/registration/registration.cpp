@@ -22,6 +22,9 @@ namespace {
 // Largest sigmas of a registration that may be written.
 constexpr double max_sigma_m = 3e-3, max_sigma_rad = 0.02;
 
+// In the frames' own sigmas; up to as much, residuals that are honest scatter.
+constexpr double most_noise = 1.5;
+
 constexpr double unmodelled = unmodelled_sigmas * unmodelled_sigmas;  // times the variance
 
 // Jacobian of the four numbers x y z w for a small rotation about the frame's own axes.
@@ -60,10 +63,9 @@ Eigen::Quaterniond usual_rotation(const std::vector<TimedPose>& poses) {
   return Eigen::Quaterniond(axes).normalized();
 }
 
-// Half of a frame's error of the roll is the film's, the print's and the image's processing: common to all frames, and
-// indistinguishable from psi's offset.
+// What is common to all frames is indistinguishable from psi's offset.
 double common_turn_rad(const std::vector<TimedPose>& poses) {
-  return 0.5 * median(values_of(poses, [](const TimedPose& pose) { return pose.marker.sigma_roll_rad; }));
+  return common_roll_part * median(values_of(poses, [](const TimedPose& pose) { return pose.marker.sigma_roll_rad; }));
 }
 
 void report_arm(const ArmFit& fitted, Registration& result) {
@@ -230,6 +232,11 @@ Registration register_arm(const Instrument& instrument, const std::vector<TimedP
   if (is_open || is_misfit) {
     if (const std::string fault = explained(&*fit); !fault.empty() || !fit->faults.empty())
       result.refusal = misfit_text(fault.empty() ? fit->faults.front() : fault);
+    else if (is_misfit && fit->noise.maxCoeff() < most_noise)
+      result.refusal = fmt::format(
+          "the marker is {:.1f} mm and {:.0f} mrad rms from where the joints have it, as the frames' own sigmas allow, "
+          "expected at most {:.0f} mm and {:.0f} mrad: record it nearer, sharper and less compressed",
+          1e3 * off.m, 1e3 * off.rad, 1e3 * max_sigma_m, 1e3 * max_sigma_rad);
     else if (is_misfit)
       result.refusal = fmt::format(
           "the marker is {:.1f} mm and {:.0f} mrad rms from where the joints have it, {:.0f} times the images' noise: "

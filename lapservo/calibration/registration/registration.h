@@ -43,6 +43,7 @@ struct Registration {
   std::optional<Arm> arm;
 
   /// Faults of the poses and the joints' readings that show beyond the noise, one sentence each: the sigmas count them.
+  /// They count those, too, that frames of this quality may feign; these are not among them.
   std::vector<std::string> faults;
   std::vector<std::string> unknown;  ///< quantities that these data do not determine, one sentence each
   std::vector<RegistrationResidual> residuals;

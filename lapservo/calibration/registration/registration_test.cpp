@@ -216,6 +216,33 @@ TEST(RegisterArm, NamesTheJointWhoseScaleIsFarOff) {
   }
 }
 
+// As compressed pictures have it: psi off with the shaft's direction, by a part of what the frames say of themselves.
+TEST(RegisterArm, NamesNoCauseThatTheFramesOwnErrorsExplain) {
+  constexpr double by_yaw = 0.04;  // rad/rad
+  for (const auto& [sigma_rad, is_named] : {std::pair{1e-3, true}, std::pair{15e-3, false}}) {
+    Recorded data = recorded({});
+    for (TimedPose& pose : data.poses) {
+      const auto q = data.truth.camera_from_rcm->inverse() * pose.marker.camera_from_marker;
+      const Eigen::AngleAxisd off(by_yaw * std::atan2(q.translation.y(), q.translation.x()), Eigen::Vector3d::UnitZ());
+      pose.marker.camera_from_marker.rotation = pose.marker.camera_from_marker.rotation * off;
+      pose.marker.sigma_roll_rad = sigma_rad;
+    }
+    const auto found = registered_from_names(data);
+    const std::string words = found.faults.empty() ? found.refusal : found.faults.front();
+    EXPECT_EQ(has(words, "roll moves with the readings of yaw"), is_named) << words;
+    EXPECT_TRUE(is_named || words.empty()) << words;
+  }
+  // Far off, but no farther than their sigmas: too poor, and not another arm's recording.
+  Recorded poor = recorded({});
+  Random random(5);
+  for (TimedPose& pose : poor.poses) {
+    const Eigen::AngleAxisd off(0.04 * random.normal(), Eigen::Vector3d::UnitZ());
+    pose.marker.camera_from_marker.rotation = pose.marker.camera_from_marker.rotation * off;
+    pose.marker.sigma_roll_rad = 0.04;
+  }
+  EXPECT_TRUE(has(registered_from_names(poor).refusal, "as the frames' own sigmas allow"));
+}
+
 TEST(RegisterArm, RefusesWhatCanNotTell) {
   EXPECT_TRUE(has(registered_from_names(recorded({.swing = {0.01, 0.01, 0.01, 0.01}})).refusal, "swing"));
   const Recorded data = recorded({});
