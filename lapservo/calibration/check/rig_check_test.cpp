@@ -249,6 +249,17 @@ TEST_F(CheckRig, NamesAWrongResponseFirst) {
   for (const std::string& text : needed(findings)) EXPECT_FALSE(testing::has(text, "encodes light"));
 }
 
+// The same marker at the same place may well suffice without losses.
+TEST_F(CheckRig, SeesAPoorWorkSpaceInACompressedRecordingAsTheRecordings) {
+  for (const bool lossy : {false, true}) {
+    RigFindings findings;
+    findings.light = MarkerLight{.value = 200, .chroma = 100};
+    findings.registered = true, findings.width_px = 100, findings.lossy = lossy;
+    findings.work_space = WorkSpace{.good = 0, .worst_rad = 0.015, .places = 30};
+    expect_first(findings, lossy ? "-> record without losses" : "-> come nearer");
+  }
+}
+
 TEST_F(CheckRig, WithoutJointsComparesTheRcm) {
   RigEvidence evidence(rig, 0);
   for (std::size_t i = 0; i < pictures().size(); ++i) evidence.add(pictures()[i], static_cast<double>(i) / fps);

@@ -257,7 +257,8 @@ void SpreadFrames::add(const cv::Mat& bgr) {
 }
 
 ColourCalibration calibrate_colour(const Rig& rig, std::size_t instrument, const std::vector<cv::Mat>& frames,
-                                   bool keep_response, const std::function<void(const std::string&)>& progress) {
+                                   bool keep_response, const std::function<void(const std::string&)>& progress,
+                                   bool lossy) {
   ColourCalibration calibration;
   if (frames.size() < min_colour_frames)
     return calibration.refusal = fmt::format("{} frames, at least {} are needed", frames.size(), min_colour_frames),
@@ -286,9 +287,10 @@ ColourCalibration calibrate_colour(const Rig& rig, std::size_t instrument, const
     calibration.response_found =
         result->better && keep_response
             ? fmt::format(
-                  "as it is: kept, though the marker alone says {}, which contradicts the board that measured it. A "
-                  "camera that sharpens makes it so; where it does not, --replace-response takes the marker's",
-                  result->name)
+                  "as it is: kept, though the marker alone says {}, which contradicts the board that measured it. {} "
+                  "makes it so; where it does not, --replace-response takes the marker's",
+                  result->name,
+                  lossy ? "Compression, as of this recording, or a camera that sharpens" : "A camera that sharpens")
         : result->better
             ? fmt::format("{}: channels that rise at {} edges lie {:.3f} px from those that fall, {:.3f} px before",
                           result->name, result->edges, result->after_px, result->before_px)
@@ -297,9 +299,10 @@ ColourCalibration calibrate_colour(const Rig& rig, std::size_t instrument, const
     constexpr double seen_sigmas = 3, least_px = 0.02;
     if (std::abs(result->left_px) > std::max(least_px, seen_sigmas * result->sigma_left_px))
       calibration.response_found += fmt::format(
-          "; no usual one explains the edges, {:.3f} px are left beyond their noise: switch the camera's sharpening "
-          "off, or lapservo calibrate camera",
-          std::abs(result->left_px));
+          "; no usual one explains the edges, {:.3f} px are left beyond their noise: {}", std::abs(result->left_px),
+          lossy           ? "the recording is compressed: record without losses or at a higher bit rate"
+          : keep_response ? "switch the camera's sharpening off"
+                          : "switch the camera's sharpening off, or lapservo calibrate camera");
   } else {
     calibration.response_found = "as it is: too few edges; come nearer";
   }
@@ -344,9 +347,9 @@ ColourMeasurement measure_colour(const Rig& rig, std::size_t instrument, const F
   const bool is_named = recording.source.is_srgb();
   const bool keep_response = is_named || (!replace_response && rig.camera.response.sigma.has_value());
   int step = 0;
-  measured.calibration = calibrate_colour(rig, instrument, kept.frames(), keep_response, [&](const std::string& what) {
-    watch.tell(std::nullopt, ++step, ": " + what);
-  });
+  measured.calibration = calibrate_colour(
+      rig, instrument, kept.frames(), keep_response,
+      [&](const std::string& what) { watch.tell(std::nullopt, ++step, ": " + what); }, measured.read.lossy);
   if (is_named) measured.calibration.response_found = "as it is: the recording names how it encodes light";
   if (!measured.calibration.refusal.empty() &&
       2 * measured.calibration.found_before < static_cast<int>(measured.frames)) {

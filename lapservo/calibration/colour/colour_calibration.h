@@ -37,10 +37,11 @@ struct ColourCalibration {
 
 /// The hues of a mounted marker's bands as the camera has them, and how it encodes light, from frames of it in motion
 /// (8-bit BGR of the rig's size). The rig's hues may be so wrong that it is not found at all: up to 60 degrees each.
-/// With keep_response the rig's stays, whatever the frames say: to a marker, sharpening looks like another response.
+/// With keep_response the rig's stays, whatever the frames say: to a marker, sharpening looks like another response,
+/// and so does compression, which is named where the frames are `lossy`.
 ColourCalibration calibrate_colour(
     const Rig& rig, std::size_t instrument, const std::vector<cv::Mat>& frames, bool keep_response = false,
-    const std::function<void(const std::string&)>& progress = [](const auto&) {});
+    const std::function<void(const std::string&)>& progress = [](const auto&) {}, bool lossy = false);
 
 /// The frame in grey, with what is one of the rig's colours painted in its hue.
 cv::Mat segmentation_picture(const cv::Mat& bgr, const Rig& rig);

@@ -85,6 +85,7 @@ TEST_F(CalibrateColour, TellsAnotherResponse) {
   const auto kept = calibrate_colour(rig, 0, filmed(real, {}), true);
   EXPECT_FALSE(kept.response);
   EXPECT_TRUE(has(kept.response_found, "the marker alone says gamma:1.8"));
+  EXPECT_TRUE(has(kept.response_found, "A camera that sharpens makes it so"));
 }
 
 // 1.4 and 1.6 lie between those that it tries.
@@ -93,6 +94,17 @@ TEST_F(CalibrateColour, NamesAResponseThatIsNoUsualOne) {
     real.camera.response = {Response::Kind::power, gamma};
     const std::string found = calibrate_colour(rig, 0, filmed(real, {})).response_found;
     EXPECT_EQ(found.find("no usual one explains") == std::string::npos, is_usual) << found;
+    EXPECT_EQ(has(found, "or lapservo calibrate camera"), !is_usual) << found;
+  }
+  // A board measured the response: to measure it again leads back here. Compressed frames say nothing of the camera.
+  real.camera.response = {Response::Kind::power, 1.4};
+  for (const bool lossy : {false, true}) {
+    const std::string found = calibrate_colour(
+                                  rig, 0, filmed(real, {}), true, [](const auto&) {}, lossy)
+                                  .response_found;
+    EXPECT_FALSE(has(found, "lapservo calibrate camera")) << found;
+    EXPECT_EQ(has(found, "switch the camera's sharpening off"), !lossy) << found;
+    EXPECT_EQ(has(found, "the recording is compressed"), lossy) << found;
   }
 }
 
