@@ -14,6 +14,7 @@ namespace lapservo::internal {
 namespace {
 
 constexpr std::size_t looked_ahead = 5;  // messages, and as many behind
+constexpr auto not_later = "its stamp is not later than the one before";
 
 // nullopt of what is no message of its type.
 std::optional<double> stamp_of(const BagMessage& message) {
@@ -34,6 +35,11 @@ void StampedMessages::leave_out(const std::string& why) {
   if (left_out_++ == 0) why_ = why;
 }
 
+void StampedMessages::leave_out_repeated() {
+  ++repeated_;
+  leave_out(not_later);
+}
+
 void StampedMessages::look_ahead() {
   while (!ended_ && ahead_.size() <= looked_ahead) {
     auto message = messages_->next();
@@ -44,7 +50,10 @@ void StampedMessages::look_ahead() {
       leave_out("no message of its type; message by message compressed bags want `ros2 bag convert`");
     } else if (!(*stamp_s > 0)) {
       leave_out("no stamp");
+    } else if (*stamp_s == last_read_s_) {
+      leave_out_repeated();
     } else {
+      last_read_s_ = *stamp_s;
       ahead_.push_back({{*stamp_s, messages_->recorded_s()}, std::move(*message)});
     }
   }
@@ -63,11 +72,10 @@ StampedMessages::Around StampedMessages::around(const Seen& seen) const {
   return {median(leads_s), std::max(least_s, (looked_ahead + 1) * quantile_of(gaps_s, 0.5))};
 }
 
-// Whether all of those ahead would be left out.
-bool StampedMessages::goes_back(double last_s) const {
-  return ahead_.size() >= looked_ahead && std::all_of(ahead_.begin(), ahead_.end(), [&](const Ahead& one) {
-           return one.seen.stamp_s + shift_s_ <= last_s;
-         });
+// Whether this stamp and all of those ahead are before the last one: a stamp that is repeated is no clock that was set.
+bool StampedMessages::goes_back(const Seen& seen) const {
+  return seen.stamp_s < last_stamp_s_ && ahead_.size() >= looked_ahead &&
+         std::all_of(ahead_.begin(), ahead_.end(), [&](const Ahead& one) { return one.seen.stamp_s < last_stamp_s_; });
 }
 
 std::optional<StampedMessage> StampedMessages::next() {
@@ -83,16 +91,14 @@ std::optional<StampedMessage> StampedMessages::next() {
       continue;
     }
     const double step_s = last_lead_s_ ? lead_s - *last_lead_s_ : 0;
-    const bool is_late = last_s_ && seen.stamp_s + shift_s_ <= *last_s_;
-    if (step_s > least_step_s || (is_late && goes_back(*last_s_))) {
+    if (step_s > least_step_s || goes_back(seen)) {
       constexpr double least_s = 1e-6;
       shift_s_ = std::max(shift_s_ - step_s, *last_s_ + least_s - seen.stamp_s);
       ++steps_;
     }
     const double time_s = seen.stamp_s + shift_s_;
     if (last_s_ && !(time_s > *last_s_)) {
-      repeated_ += seen.stamp_s == last_stamp_s_;
-      leave_out("its stamp is not later than the one before");
+      seen.stamp_s == last_stamp_s_ ? leave_out_repeated() : leave_out(not_later);
       continue;
     }
     last_s_ = time_s, last_lead_s_ = lead_s, last_stamp_s_ = seen.stamp_s;

@@ -111,10 +111,14 @@ TEST(StampedMessages, AreNoStepsWhereOnlyTheirWayWasSlow) {
   EXPECT_GE(read(late).times_s.size(), count - 2);
   EXPECT_EQ(read(late).steps, 0);
 
-  auto repeated = usual();
-  for (std::size_t i = 1; i < count; i += 2) repeated[i].stamp_s = repeated[i - 1].stamp_s;
-  EXPECT_EQ(read(repeated).times_s.size(), count / 2);
-  EXPECT_EQ(read(repeated).repeated, static_cast<int>(count / 2));
+  for (const std::size_t times : {2U, 10U}) {
+    auto repeated = usual();
+    for (std::size_t i = 0; i < count; ++i) repeated[i].stamp_s = repeated[i - i % times].stamp_s;
+    const Read result = read(repeated);
+    EXPECT_EQ(result.times_s.size(), count / times);
+    EXPECT_EQ(result.repeated, static_cast<int>(count - count / times));
+    EXPECT_EQ(result.steps, 0);
+  }
 
   auto busy = usual(), paused = usual();
   for (std::size_t i = 20; i < count; ++i) {
