@@ -7,6 +7,7 @@
 #include <climits>
 #include <fmt/format.h>
 
+#include "lapservo/calibration/recording/joint_recording.h"
 #include "lapservo/core/error.h"
 #include "lapservo/crtk/image_decoder.h"
 #include "lapservo/io/pictures/picture_parts.h"
@@ -59,8 +60,8 @@ std::string BagFrames::complaint() const {
   if (const int left_out = messages_.left_out() + unreadable_; left_out > 0)
     text = fmt::format("{}: {} of {} images are left out ({})", topic_.name, left_out, left_out + index_, why());
   if (messages_.steps() == 0) return text;
-  return fmt::format("{}{}the clock of {} was set {} times: times go on by the recorder's", text,
-                     text.empty() ? "" : "; ", topic_.name, messages_.steps());
+  return fmt::format("{}{}{}", text, text.empty() ? "" : "; ",
+                     clock_set_text(topic_.name, messages_.steps(), messages_.steps_by_gap()));
 }
 
 }  // namespace lapservo::internal

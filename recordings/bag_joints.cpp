@@ -99,7 +99,7 @@ JointRecording joints_in_bag(const Bag& bag, const BagTopic& topic, const Joints
   }
   recording.repeated = messages.repeated();
   recording.left_out = messages.left_out() - messages.repeated();
-  recording.steps = messages.steps();
+  recording.steps = messages.steps(), recording.steps_by_gap = messages.steps_by_gap();
   if (recording.time_s.empty() && recording.of_other_arms > 0)
     throw InputError(source, fmt::format("has no positions of the rig's joints {}: it names {}",
                                          fmt::join(joints.names, ", "), fmt::join(other_names, ", ")));

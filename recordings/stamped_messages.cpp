@@ -78,6 +78,14 @@ bool StampedMessages::goes_back(const Seen& seen) const {
          std::all_of(ahead_.begin(), ahead_.end(), [&](const Ahead& one) { return one.seen.stamp_s < last_stamp_s_; });
 }
 
+// The usual time from one of the stamps ahead to the next.
+double StampedMessages::usual_gap_s(const Seen& seen) const {
+  std::vector<double> gaps_s;
+  double before_s = seen.stamp_s;
+  for (const Ahead& one : ahead_) gaps_s.push_back(one.seen.stamp_s - std::exchange(before_s, one.seen.stamp_s));
+  return quantile_of(gaps_s, 0.5);
+}
+
 std::optional<StampedMessage> StampedMessages::next() {
   constexpr double least_step_s = 10;  // recorders and networks are late by less
   while (look_ahead(), !ahead_.empty()) {
@@ -93,7 +101,12 @@ std::optional<StampedMessage> StampedMessages::next() {
     const double step_s = last_lead_s_ ? lead_s - *last_lead_s_ : 0;
     if (step_s > least_step_s || goes_back(seen)) {
       constexpr double least_s = 1e-6;
-      shift_s_ = std::max(shift_s_ - step_s, *last_s_ + least_s - seen.stamp_s);
+      shift_s_ -= step_s;
+      // The recorder's clock was set back with it, or has one time for many.
+      if (seen.stamp_s + shift_s_ <= *last_s_) {
+        shift_s_ = *last_s_ + std::max(usual_gap_s(seen), least_s) - seen.stamp_s;
+        ++steps_by_gap_;
+      }
       ++steps_;
     }
     const double time_s = seen.stamp_s + shift_s_;

@@ -19,7 +19,8 @@ struct StampedMessage {
 /// The messages of a topic whose stamps rise, as seen a few messages ahead. Left out and counted are messages without a
 /// stamp, those whose stamp is not later than the one before, and those whose stamp stands out from those before and
 /// behind it, compared with the recorder's times. Where the stamps go on from another time, because a clock was set,
-/// times go on by the recorder's. A stamp that is repeated, however often, is no clock that was set.
+/// times go on by the recorder's; where that shows no later time, set back too, by the usual time from message to
+/// message. A stamp that is repeated, however often, is no clock that was set.
 class StampedMessages {
  public:
   /// `wanted`: which of the messages count at all; empty: all.
@@ -35,6 +36,8 @@ class StampedMessages {
   const std::string& why() const { return why_; }
   /// How often the clock was set.
   int steps() const { return steps_; }
+  /// How often of these the recorder's showed no later time.
+  int steps_by_gap() const { return steps_by_gap_; }
 
  private:
   struct Seen {
@@ -50,6 +53,7 @@ class StampedMessages {
   };
   void look_ahead();
   Around around(const Seen& seen) const;
+  double usual_gap_s(const Seen& seen) const;
   bool goes_back(const Seen& seen) const;
   void leave_out(const std::string& why);
   void leave_out_repeated();
@@ -61,7 +65,7 @@ class StampedMessages {
   std::optional<double> last_s_, last_lead_s_;
   double last_stamp_s_ = 0, last_read_s_ = 0;  // of what was given, and of what was read ahead
   double shift_s_ = 0;                         // of the stamps to the clock at the first message
-  int left_out_ = 0, repeated_ = 0, steps_ = 0;
+  int left_out_ = 0, repeated_ = 0, steps_ = 0, steps_by_gap_ = 0;
   std::string why_;
   bool ended_ = false;
 };

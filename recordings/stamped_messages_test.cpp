@@ -32,7 +32,7 @@ class ListedMessages : public BagMessages {
 
 struct Read {
   std::vector<double> times_s;
-  int left_out = 0, repeated = 0, steps = 0;
+  int left_out = 0, repeated = 0, steps = 0, steps_by_gap = 0;
 };
 
 Read read(const std::vector<Recorded>& all) {
@@ -40,6 +40,7 @@ Read read(const std::vector<Recorded>& all) {
   Read result;
   while (const auto message = messages.next()) result.times_s.push_back(message->time_s);
   result.left_out = messages.left_out(), result.repeated = messages.repeated(), result.steps = messages.steps();
+  result.steps_by_gap = messages.steps_by_gap();
   return result;
 }
 
@@ -89,15 +90,17 @@ TEST(StampedMessages, ThoseWhoseStampsStandOutAreFoundWithoutTheRecorder) {
   }
 }
 
-TEST(StampedMessages, GoOnByTheRecorderWhereTheClockWasSet) {
-  for (const double by_s : {-3600.0, -0.3, 3600.0, 60.0})
+TEST(StampedMessages, GoOnByTheRecorderOrTheUsualGapWhereTheClockWasSet) {
+  for (const auto& [by_s, recorder_by_s] :
+       {std::pair{-3600.0, 0.0}, {-0.3, 0.0}, {3600.0, 0.0}, {60.0, 0.0}, {-3600.0, -3600.0}, {-0.3, -0.3}})
     for (const std::size_t at : {std::size_t{6}, std::size_t{30}}) {
       auto all = usual();
       const auto expected = all;
-      for (std::size_t i = at; i < count; ++i) all[i].stamp_s += by_s;
+      for (std::size_t i = at; i < count; ++i) all[i].stamp_s += by_s, all[i].recorded_s += recorder_by_s;
       const Read result = read(all);
       ASSERT_EQ(result.times_s.size(), count) << by_s << " s at " << at;
       EXPECT_EQ(result.steps, 1);
+      EXPECT_EQ(result.steps_by_gap, recorder_by_s < 0);
       for (std::size_t i = 0; i < count; ++i) EXPECT_NEAR(result.times_s[i], expected[i].stamp_s, late_s) << by_s;
       expect_rises(result);
     }

@@ -52,8 +52,14 @@ std::string JointRecording::remark() const {
   add(left_out, "readings without a stamp that goes with the others'"), add(no_numbers, "readings that are no numbers");
   std::string text = parts.empty() ? "" : fmt::format("passed over: {}", fmt::join(parts, ", "));
   if (steps == 0) return text;
-  return fmt::format("{}{}the clock of the joints was set {} times: times go on by the recorder's", text,
-                     text.empty() ? "" : "; ", steps);
+  return fmt::format("{}{}{}", text, text.empty() ? "" : "; ", clock_set_text("the joints", steps, steps_by_gap));
+}
+
+std::string clock_set_text(const std::string& whose, int steps, int steps_by_gap) {
+  const std::string by_gap =
+      steps_by_gap == 0 ? ""
+                        : fmt::format(", {} times by the usual gap: the recorder's shows no later time", steps_by_gap);
+  return fmt::format("the clock of {} was set {} times: times go on by the recorder's{}", whose, steps, by_gap);
 }
 
 JointRecording read_joint_recording(const std::filesystem::path& path, const Joints& joints, JointsOf whose) {

@@ -24,12 +24,16 @@ struct JointRecording {
   int left_out = 0;                           ///< messages passed over: their stamps are none, late or stand out
   int no_numbers = 0;                         ///< readings passed over: not finite
   int steps = 0;                              ///< how often the clock that stamps them was set
+  int steps_by_gap = 0;                       ///< how often of these the recorder's showed no later time
 
   /// Between two rows, linearly; nullopt before the first and after the last one, and across pauses of half a second.
   std::optional<std::array<double, 4>> at(double time_s) const;
   /// How many readings were passed over and why, and that the clock was set; empty where nothing is to be said.
   std::string remark() const;
 };
+
+/// How often the clock of a topic, or of the joints, was set, and by what times go on.
+std::string clock_set_text(const std::string& whose, int steps, int steps_by_gap);
 
 /// The joints' readings during frames.
 struct JointInput {
