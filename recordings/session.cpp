@@ -1,12 +1,17 @@
 #include "recordings/session.h"
 
+#include <algorithm>
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <numeric>
 #include <optional>
 #include <system_error>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -14,6 +19,7 @@
 #include <fmt/ranges.h>
 
 #include "lapservo/core/error.h"
+#include "lapservo/core/statistics.h"
 
 namespace lapservo::internal {
 namespace {
@@ -55,22 +61,55 @@ fs::path beside(const fs::path& folder, const std::string& file) {
 std::optional<std::int64_t> time_in(const json& times, const char* key) {
   const json& time = member(times, key);
   const std::int64_t time_ns = time.is_number_integer() ? time.get<std::int64_t>() : 0;
-  return time_ns > 0 ? std::optional(time_ns) : std::nullopt;
+  constexpr std::int64_t latest_ns = std::numeric_limits<std::int64_t>::max() / 2;  // the sum of two is a number, too
+  return time_ns > 0 && time_ns < latest_ns ? std::optional(time_ns) : std::nullopt;
 }
 
-std::optional<std::int64_t> preferred_time_ns(const json& frame) {
+// A frame's times of each kind, in the order in which they are preferred.
+using Times = std::array<std::optional<std::int64_t>, 5>;
+
+Times times_of(const json& frame) {
   const json& times = member(member(frame, "cpu"), "realtime");
-  if (const auto of_one = time_in(times, "mono_source_ns")) return of_one;
   const auto left = time_in(times, "left_source_ns"), right = time_in(times, "right_source_ns");
-  if (left && right) return std::midpoint(*left, *right);
-  if (left || right) return left ? left : right;
-  return time_in(times, "recorder_reception_ns");
+  const auto middle = left && right ? std::optional(std::midpoint(*left, *right)) : std::nullopt;
+  return {time_in(times, "mono_source_ns"), middle, left, right, time_in(times, "recorder_reception_ns")};
 }
 
 struct Part {
   std::string video, layout;
+  std::vector<Times> recorded;         // of the frames, until set_times()
   std::vector<std::int64_t> times_ns;  // of the frames
 };
+
+// Times of one kind for all frames of a stream: the first that any of them has. Another kind counts less what it is
+// usually later.
+void set_times(std::vector<Part>& parts) {
+  std::size_t kind = std::tuple_size_v<Times>;
+  const auto for_all = [&](const auto& look_at) {
+    for (const Part& part : parts) std::ranges::for_each(part.recorded, look_at);
+  };
+  for_all([&](const Times& times) {
+    const auto has = std::ranges::find_if(times, [](const auto& time_ns) { return time_ns.has_value(); });
+    kind = std::min(kind, static_cast<std::size_t>(has - times.begin()));
+  });
+  Times later_ns;  // nullopt where no frame has both kinds
+  for (std::size_t i = 0; i < later_ns.size(); ++i) {
+    std::vector<std::int64_t> all_ns;
+    for_all([&](const Times& times) {
+      if (times[i] && times[kind]) all_ns.push_back(*times[i] - *times[kind]);
+    });
+    if (!all_ns.empty()) later_ns[i] = median(all_ns);
+  }
+  for (Part& part : parts) {
+    for (const Times& times : part.recorded) {
+      std::optional<std::int64_t> known_ns, other_ns;
+      for (std::size_t i = times.size(); i-- > 0;)
+        if (times[i]) (later_ns[i] ? known_ns : other_ns) = *times[i] - later_ns[i].value_or(0);
+      part.times_ns.push_back(known_ns ? *known_ns : other_ns.value());
+    }
+    part.recorded = {};
+  }
+}
 
 Part read_sidecar(const fs::path& path) {
   Part sidecar;
@@ -78,17 +117,17 @@ Part read_sidecar(const fs::path& path) {
   // A frame's record has 20 numbers, an hour 100,000 of them: none is kept.
   const auto take_frame = [&](int depth, json::parse_event_t event, json& parsed) {
     if (event != json::parse_event_t::object_end || depth != 2 || !parsed.contains("frame_index")) return true;
-    const auto time_ns = preferred_time_ns(parsed);
-    wrong += !time_ns || parsed["frame_index"] != sidecar.times_ns.size();
-    sidecar.times_ns.push_back(time_ns.value_or(0));
+    const Times times = times_of(parsed);
+    wrong += times == Times() || parsed["frame_index"] != sidecar.recorded.size();
+    sidecar.recorded.push_back(times);
     return false;
   };
   sidecar.layout = text_in(read_json(path, sidecar_type, take_frame), "side_by_side");
-  if (wrong > 0 || sidecar.times_ns.empty())
+  if (wrong > 0 || sidecar.recorded.empty())
     throw InputError(path.string(),
                      fmt::format("has {} frames, {} of them without a time or out of turn, expected each "
                                  "frame's time",
-                                 sidecar.times_ns.size(), wrong));
+                                 sidecar.recorded.size(), wrong));
   return sidecar;
 }
 
@@ -208,6 +247,7 @@ SessionVideo open_session(const std::string& folder, const std::string& stream, 
     session.layout = part.layout == "LR" || part.layout == "RL" ? part.layout : std::string();
     parts.push_back(std::move(part));
   }
+  set_times(parts);
   session.frames = std::make_unique<SessionFrames>(std::move(parts), reading);
   return session;
 }

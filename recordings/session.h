@@ -21,8 +21,9 @@ struct SessionVideo {
 
 /// The frames of a session's video stream, by the realtime clock of the computer that recorded it, as dvrk_data's own
 /// tools take it from what each frame's record has: the source's time, the middle between those of the left and the
-/// right one, either of them, or the time of arrival at the recorder. `stream`: its name; empty: the only one. Throws
-/// InputError where none or several remain, and for damaged files.
+/// right one, either of them, or the time of arrival at the recorder. The first of these that any frame has counts for
+/// all; a frame without it has another one less their median difference. `stream`: its name; empty: the only one.
+/// Throws InputError where none or several remain, and for damaged files.
 SessionVideo open_session(const std::string& folder, const std::string& stream, const VideoReading& reading);
 
 }  // namespace lapservo::internal

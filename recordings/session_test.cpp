@@ -102,7 +102,9 @@ TEST(Session, TakesTheTimesInTheDocumentedOrder) {
       as_received, [&](std::int64_t t) { return left(t) + "," + as_received(t + off); },
       [&](std::int64_t t) { return right(t) + ", \"left_source_ns\": null," + as_received(t + off); },
       [&](std::int64_t t) { return left(t - off) + "," + right(t + off) + "," + as_received(t + 9 * off); },
-      [&](std::int64_t t) { return one(t) + "," + left(t + off) + "," + right(t + off); }};
+      [&](std::int64_t t) { return one(t) + "," + left(t + off) + "," + right(t + off); },
+      // The second frame has only the time that comes three frames later.
+      [&](std::int64_t t) { return (t == begin_ns + 40000000 ? "" : one(t) + ",") + as_received(t + 40 * off); }};
   for (const Times& times : cases) {
     SessionFolder folder;
     folder.add("stereo", 3, 3, "undefined", times);
