@@ -18,7 +18,17 @@
 namespace lapservo::internal {
 namespace {
 
+// That of a recorder which writes the file or was killed.
+bool has_log(const std::string& path) {
+  std::error_code error;
+  return std::filesystem::file_size(path + "-wal", error) > 0 && !error;
+}
+
 [[noreturn]] void refuse(const std::string& path, sqlite3* database) {
+  const int code = sqlite3_errcode(database);
+  if (has_log(path) && (code == SQLITE_CANTOPEN || code == SQLITE_READONLY))
+    throw InputError(path, std::string("can't be read with the log beside it (-wal: ") + sqlite3_errmsg(database) +
+                               "), expected a folder that can be written: copy the folder to where it can be");
   throw InputError(path, std::string("can't be read as a ROS 2 bag (") + sqlite3_errmsg(database) +
                              "), expected a whole .db3: copy it again, or try `sqlite3 FILE .recover`");
 }
@@ -27,9 +37,7 @@ namespace {
 std::string address_of(const std::string& path) {
   std::string address = "file:";
   for (const char c : path) address += c == '%' || c == '?' || c == '#' ? fmt::format("%{:02x}", c) : std::string(1, c);
-  std::error_code error;
-  const bool logged = std::filesystem::file_size(path + "-wal", error) > 0 && !error;
-  return address + (logged ? "?mode=ro" : "?mode=ro&immutable=1");
+  return address + (has_log(path) ? "?mode=ro" : "?mode=ro&immutable=1");
 }
 
 // A query's rows, one after the other.

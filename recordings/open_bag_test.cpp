@@ -153,6 +153,10 @@ TEST(OpenBag, RefusesInOneLineWhatItCannotRead) {
   testing::write_ros2_bag(folder / "whole.db3", entries(as_ros2));
   const std::string db3 = testing::read_file(folder / "whole.db3");
   expect(refusal(file("cut.db3", db3.substr(0, db3.size() / 2))), "can't be read as a ROS 2 bag");
+  std::string logged = db3;
+  logged[18] = logged[19] = 2;  // by a log, whose index has no place
+  file("logged.db3-wal", "a log"), std::filesystem::create_symlink("none/none", folder / "logged.db3-shm");
+  expect(refusal(file("logged.db3", logged)), "copy the folder to where it can be");
   expect(refusal(file("empty.db3", "")), "is empty");
   expect(refusal(file("foreign.db3", "a text that is no database")), "can't be read as a ROS 2 bag");
   expect(refusal(file("packed.db3.zstd", "\x28\xb5\x2f\xfd")), "zstd -d");
