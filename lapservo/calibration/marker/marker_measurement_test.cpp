@@ -109,14 +109,14 @@ TEST(RegisterSeam, RefusesRecordingsOfOtherTimesAndOtherTurns) {
   EXPECT_TRUE(has(seam_of(backwards).refusal, "joints.sign"));
 }
 
-JointRecording read(const std::string& rows) {
+JointRecording read(const std::string& rows, JointsOf whose = JointsOf::arm) {
   const lapservo::testing::TemporaryFolder folder;
   write_file(folder / "joints.csv", rows);
-  return read_joint_recording(folder / "joints.csv", instrument_with_joints().joints.value());
+  return read_joint_recording(folder / "joints.csv", instrument_with_joints().joints.value(), whose);
 }
 
-void expect_wrong(const std::string& rows, const std::string& part) {
-  EXPECT_TRUE(has(lapservo::testing::input_error([&] { read(rows); }), part));
+void expect_wrong(const std::string& rows, const std::string& part, JointsOf whose = JointsOf::arm) {
+  EXPECT_TRUE(has(lapservo::testing::input_error([&] { read(rows, whose); }), part));
 }
 
 const std::string header = "time_s,yaw,pitch,insertion,roll\n";
@@ -128,6 +128,7 @@ TEST(JointRecordingFile, NamesWhatIsWrong) {
   expect_wrong(header + "1,0,0,0,0\n", "two rows");
   expect_wrong(header + "0,0,0,0,0\n1,20,0,0,0\n", "looks like degrees");
   expect_wrong(header + "0,0,0,0,0\n1,0,0,90,0\n", "looks like millimetres");
+  expect_wrong(header + "0,0,0,0,0\n1,0,0,0,7\n", "looks like degrees", JointsOf::wrist);
   const JointRecording recording = read("time_s,roll,yaw,pitch,insertion\n0,4,1,2,0.3\n1,8,5,6,0.7\n");
   EXPECT_EQ(recording.joints[1], (std::array<double, 4>{5, 6, 0.7, 8}));
 }

@@ -93,7 +93,7 @@ void check_units(const JointRecording& recording, const Joints& joints, const st
   for (std::size_t i = 0; i < joints.names.size(); ++i) {
     const bool is_length = whose == JointsOf::arm && i == 2;
     for (const auto& at : recording.joints)
-      if (std::abs(at[i]) > (is_length ? largest_m : largest_rad[i]))
+      if (std::abs(at[i]) > (is_length ? largest_m : whose == JointsOf::wrist ? turn_rad : largest_rad[i]))
         throw InputError(source, joints.names[i], fmt::format("{:.6g}", at[i]),
                          is_length ? "metres: it looks like millimetres" : "radians: it looks like degrees");
   }

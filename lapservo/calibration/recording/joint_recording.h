@@ -53,7 +53,7 @@ JointRecording joint_recording_of(const CsvTable& table, const std::string& sour
                                   JointsOf whose = JointsOf::arm);
 
 /// Throws InputError naming `source` and the joint where numbers are too large for radians and metres, as degrees and
-/// millimetres are.
+/// millimetres are; of a wrist's joint beyond a turn.
 void check_units(const JointRecording& recording, const Joints& joints, const std::string& source, JointsOf whose);
 
 /// The instrument's joints; where it has none, the recording's own four in the order theta, phi, rho, psi. Throws

@@ -74,11 +74,15 @@ MeasuredPoses poses_in_frames(const Rig& rig, std::size_t instrument, const Fram
 MeasuredPoses poses_in_table(const std::filesystem::path& path, const std::string& instrument) {
   const CsvTable table = CsvTable::read(path);
   MeasuredPoses poses;
-  int rows = 0, with_rcm = 0;
+  int rows = 0, with_rcm = 0, without_pose = 0;
   for (std::size_t row = 0; row < table.rows(); ++row) {
     if (table.text(row, "instrument") != instrument) continue;
     ++rows;
-    if (table.text(row, "status") != "ok" || table.text(row, "marker_x_m").empty()) continue;
+    if (table.text(row, "status") != "ok") continue;
+    if (table.text(row, "marker_x_m").empty()) {
+      ++without_pose;
+      continue;
+    }
     if (!table.text(row, "theta_rad").empty()) {
       ++with_rcm;
       continue;
@@ -94,6 +98,11 @@ MeasuredPoses poses_in_table(const std::filesystem::path& path, const std::strin
         "its {} rows were measured with a camera_from_rcm, through which their axes pass whether it is right or not: "
         "give the images, or track them with a rig without it",
         with_rcm);
+  else if (without_pose > 0 && poses.all.empty())
+    poses.none = fmt::format(
+        "its {} rows that are ok have no pose of the marker (marker_x_m), as --method centerline has none: give the "
+        "images, or track them with --method surface",
+        without_pose);
   else if (rows == 0)
     poses.none = fmt::format("has no row of {}", instrument);
   return poses;

@@ -319,6 +319,7 @@ TEST(PosesInTable, LeavesOutWhatACameraFromRcmBent) {
   EXPECT_EQ(found.none, "");
   EXPECT_DOUBLE_EQ(found.all[0].marker.sigma_roll_rad, 2e-3);
   EXPECT_TRUE(has(read("1,A,ok,0.3," + pose).none, "its 1 rows were measured with a camera_from_rcm"));
+  EXPECT_TRUE(has(read("1,A,ok,,,,,,,,,,,,\n").none, "its 1 rows that are ok have no pose of the marker"));
   EXPECT_TRUE(has(input_error([&] { read("1,A,ok,," + pose + "0,A,ok,," + pose); }), "clock jumps"));
   EXPECT_TRUE(has(input_error([&] { read("0,A,ok,,0,0,1,0,0,0,2,1,1,1,1\n"); }), "no pose"));
 }
