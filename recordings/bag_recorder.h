@@ -22,7 +22,9 @@ struct RecordedCounts {
   long unstamped = 0;
 };
 
-/// Records messages into a ROS 2 bag as they are, in a thread of its own. Messages may come from any thread.
+/// Records messages into a ROS 2 bag, in a thread of its own: stamps, images as they are, and the joints' names and
+/// positions. Velocities, efforts and frame_ids are dropped: nothing here reads them. Messages may come from any
+/// thread.
 class BagRecorder {
  public:
   /// See Ros2BagWriter.
