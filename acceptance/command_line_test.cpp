@@ -497,6 +497,15 @@ TEST_F(CommandLine, TheTipIsKnownWhereToolAndWristAre) {
                            "lapservo: PSM2: no tip: in/run.bag: /PSM1/measured_js may have the joints of PSM1",
                            0),
             0U);
+  // A delay is that of a bag if its recorder's times say so.
+  const std::string delayed = in("delayed.yaml", plain + tool + "    image_delay_s: -1.5\n");
+  for (const double arms_clock_s : {0.0, 1.5}) {
+    write_bags_of("few", 8, CsvTable::read("in/wrist.csv"), arms_clock_s);
+    expect_done("track in/run.mcap --out out/delayed.csv --rig " + delayed);
+    EXPECT_EQ(CsvTable::read("out/delayed.csv").text(0, "tip_x_m").empty(), arms_clock_s == 0);
+    EXPECT_EQ(errors().find("no tip: the rig's image_delay_s of -1.500 s is none of in/run.mcap") != std::string::npos,
+              arms_clock_s == 0);
+  }
 #endif
 }
 

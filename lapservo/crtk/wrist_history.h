@@ -15,6 +15,8 @@ namespace lapservo::internal {
 class WristHistory {
  public:
   static constexpr double kept_s = 1, near_s = 0.25;
+  /// Delays behind the joints that images by their clock may have; the earliest is the noise of one that is 0.
+  static constexpr double earliest_delay_s = -0.02, longest_delay_s = kept_s - near_s;
 
   /// `arrival_s` never falls.
   void add(JointMessage&& message, double arrival_s) {

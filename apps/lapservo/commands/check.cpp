@@ -122,9 +122,9 @@ int check(const CalibrateOptions& options) {
   }
   checked.advice = advice_on(checked.findings);
   if (instrument.tool)
-    checked.tip =
-        tip_text(instrument, checked.frames,
-                 find_wrist_input(options.input, options.joints, options.joint_topic, rig, index, source.get()));
+    checked.tip = tip_text(instrument, checked.frames,
+                           find_wrist_input(options.input, options.joints, options.joint_topic, rig, index,
+                                            source.get(), &options.image_topic));
   checked.exact_registration = exact_registration_text(instrument);
   std::printf("%s\n", instrument.name.c_str());
   print(checked);

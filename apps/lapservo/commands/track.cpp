@@ -110,9 +110,8 @@ class LiveWrist {
   /// message that came near then has all of them.
   std::vector<double> at_exposure(const Instrument& instrument, double arrival_s) const {
     // A longer delay, or one below 0, is that of a recording by two clocks.
-    constexpr double longest_s = WristHistory::kept_s - WristHistory::near_s;
     const double delay_s = instrument.image_delay_s.value_or(0);
-    const double exposure_s = arrival_s - (delay_s >= 0 && delay_s <= longest_s ? delay_s : 0);
+    const double exposure_s = arrival_s - (delay_s >= 0 && delay_s <= WristHistory::longest_delay_s ? delay_s : 0);
     const std::lock_guard lock(mutex_);
     return history_.at(wrist_names(instrument.tool), exposure_s);
   }
@@ -382,7 +381,7 @@ class TrackRun {
       if (is_new) {
         wrists_.push_back(live_wrist_ ? WristInput{std::nullopt, other_wrist_text(options_.joints, *rigs_.rig(), i)}
                                       : find_wrist_input(options_.input, options_.joints, options_.joint_topic,
-                                                         *rigs_.rig(), i, &source_));
+                                                         *rigs_.rig(), i, &source_, &options_.image_topic));
         if (const std::string why = no_tip_text(instrument, wrists_[i]); !why.empty())
           std::fprintf(stderr, "lapservo: %s: no tip: %s\n", instrument.name.c_str(), why.c_str());
       }

@@ -11,6 +11,7 @@
 #include "lapservo/core/csv.h"
 #include "lapservo/core/error.h"
 #include "lapservo/crtk/joint_map.h"
+#include "lapservo/crtk/wrist_history.h"
 #include "lapservo/tool/wrist.h"
 #include "recordings/bag_joints.h"
 #include "recordings/bag_topics.h"
@@ -60,6 +61,18 @@ std::optional<Joints> wrist_joints(const Tool& tool, const std::vector<std::stri
   return joints;
 }
 
+// Why the rig's image_delay_s is none of the images and joints of this bag; empty where it may be. `images`: null where
+// frames have the times of the recorder's clock.
+std::string foreign_delay_text(const Instrument& instrument, const Bag& bag, const BagTopic& joints,
+                               const BagTopic* images) {
+  const double delay_s = instrument.image_delay_s.value_or(0), late_s = delay_s + clock_lead_s(bag, joints, images);
+  if (late_s >= WristHistory::earliest_delay_s && late_s <= WristHistory::longest_delay_s) return "";
+  return fmt::format(
+      "the rig's image_delay_s of {:.3f} s is none of {}: by when joints and images were recorded, images would be "
+      "{:.3f} s late, expected 0 to {:.2f} s: lapservo align measures it",
+      delay_s, bag.path(), late_s, WristHistory::longest_delay_s);
+}
+
 bool share_a_joint(const std::optional<Tool>& a, const std::optional<Tool>& b) {
   const std::vector<std::string> of_a = wrist_names(a), of_b = wrist_names(b);
   return std::any_of(of_a.begin(), of_a.end(), [&](const std::string& name) {
@@ -70,7 +83,8 @@ bool share_a_joint(const std::optional<Tool>& a, const std::optional<Tool>& b) {
 }  // namespace
 
 WristInput find_wrist_input(const std::string& input, const std::string& joints, const std::string& joint_topic,
-                            const Rig& rig, std::size_t index, const FrameSource* frames) {
+                            const Rig& rig, std::size_t index, const FrameSource* frames,
+                            const std::string* image_topic) {
   const Instrument& instrument = rig.instruments[index];
   if (!instrument.tool || instrument.tool->wrist.empty()) return {};
   const std::string path = bag_of(joints.empty() ? input : joints);
@@ -88,16 +102,25 @@ WristInput find_wrist_input(const std::string& input, const std::string& joints,
   const std::string source = topic ? path + ": " + topic->name : joints;
   if (const std::string why = other_wrist_text(source, rig, index); !why.empty()) return {std::nullopt, why};
   const auto begin_s = frames ? frames->first_stamp_s() : std::nullopt;
-  return {reported({*found,
-                    topic ? joints_in_bag(*bag, *topic, *found, begin_s, JointsOf::wrist)
-                          : read_joint_recording(joints, *found, JointsOf::wrist),
-                    source}),
-          ""};
+  WristInput wrist{reported({*found,
+                             topic ? joints_in_bag(*bag, *topic, *found, begin_s, JointsOf::wrist)
+                                   : read_joint_recording(joints, *found, JointsOf::wrist),
+                             source}),
+                   ""};
+  if (image_topic && topic && path == bag_of(input))
+    wrist.none =
+        foreign_delay_text(instrument, *bag, *topic, path == input ? &image_topic_of(*bag, *image_topic) : nullptr);
+  else if (image_topic && instrument.image_delay_s)
+    say_remark(source, fmt::format("{}'s tip counts the rig's image_delay_s of {:.3f} s, expected that of these two "
+                                   "recordings: lapservo align measures it",
+                                   instrument.name, *instrument.image_delay_s));
+  return wrist;
 }
 
 std::vector<double> wrist_at(const WristInput& wrist, const Instrument& instrument, double frame_s) {
-  const auto joints =
-      wrist.readings ? wrist.readings->recording.at(frame_s - instrument.image_delay_s.value_or(0)) : std::nullopt;
+  const auto joints = wrist.readings && wrist.none.empty()
+                          ? wrist.readings->recording.at(frame_s - instrument.image_delay_s.value_or(0))
+                          : std::nullopt;
   if (!joints) return {};
   return {joints->begin(), joints->begin() + static_cast<std::ptrdiff_t>(instrument.tool->wrist.size())};
 }

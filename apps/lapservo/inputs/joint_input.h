@@ -26,12 +26,16 @@ std::optional<internal::JointInput> find_joint_input(const CalibrateOptions& opt
 /// The readings of the joints of a tool's wrist during the frames.
 struct WristInput {
   std::optional<internal::JointInput> readings;
-  std::string none;  ///< why there are none, with the remedy; empty for a tool without a wrist
+  /// Why there are none, or none that a frame's stamp names, with the remedy; empty for a tool without a wrist.
+  std::string none;
 };
 
-/// For one of the rig's instruments. `joints`: of --joints, else `input`, where it is a bag.
+/// For one of the rig's instruments. `joints`: of --joints, else `input`, where it is a bag. `image_topic`: of
+/// --image-topic; null where the rig's image_delay_s makes no difference. In one bag the delay has to fit what shows
+/// when images and joints were recorded; with other recordings one line on stderr says that it counts.
 WristInput find_wrist_input(const std::string& input, const std::string& joints, const std::string& joint_topic,
-                            const Rig& rig, std::size_t index, const FrameSource* frames);
+                            const Rig& rig, std::size_t index, const FrameSource* frames,
+                            const std::string* image_topic);
 /// At a frame's stamp, in the order of Tool::wrist; empty where they are not known.
 std::vector<double> wrist_at(const WristInput& wrist, const Instrument& instrument, double frame_s);
 /// Why a topic's or file's readings, though they have the names of the wrist's joints, may be those of another of the

@@ -61,7 +61,7 @@ int decide_on_recording(const ServoOptions& options) {
   }
   const Instrument& instrument = arm_of(options, rig);
   auto frames = open_frames(options.replay, options.recorded, &rig.camera);
-  auto wrist = find_wrist_input(options.replay, "", options.joint_topic, rig, 0, frames.get());
+  auto wrist = find_wrist_input(options.replay, "", options.joint_topic, rig, 0, frames.get(), nullptr);
   if (const std::string why = no_tip_text(instrument, wrist); !why.empty())
     say_remark(options.replay, "no tip: " + why);
   ReplayedRun recorded(std::move(frames), *bag, images, options.joint_topic, instrument,
