@@ -48,16 +48,18 @@ std::string tip_text(const Instrument& instrument, const std::vector<FrameEviden
   std::vector<double> whole_mm;
   std::array<std::pair<std::vector<double>, const char*>, 3> parts{
       {{{}, "the shaft"}, {{}, "the marker's place"}, {{}, "the wrist's joints"}}};
+  TipFrames tip_frames;
   for (const FrameEvidence& frame : frames) {
     Observation seen;
     seen.status = frame.status, seen.marker = frame.marker;
-    const auto tip = tip_of(seen, *instrument.tool, wrist_at(wrist, instrument, frame.time_s));
+    const auto tip = seen.tip = tip_of(seen, *instrument.tool, wrist_at(wrist, instrument, frame.time_s));
+    tip_frames.add(seen, frame.time_s);
     if (!tip) continue;
     whole_mm.push_back(1e3 * tip->sigma_m());
     parts[0].first.push_back(1e3 * tip->sigma_shaft_m), parts[1].first.push_back(1e3 * tip->sigma_place_m);
     parts[2].first.push_back(1e3 * tip->sigma_readings_m);
   }
-  const std::string why = no_tip_text(instrument, wrist);
+  const std::string why = no_tip_text(instrument, wrist) + no_reading_text(instrument, wrist, tip_frames);
   if (whole_mm.empty()) return "unknown: " + (why.empty() ? "no frame has the marker and readings" : why);
   std::vector<std::pair<double, const char*>> sizes_mm;
   for (auto& [all_mm, from] : parts)

@@ -328,6 +328,7 @@ class TrackRun {
     if (csv_) csv_->commit();
     if (overlay_) overlay_->commit();
     tell_results();
+    say_without_readings();
     return tell_complaints();
   }
 
@@ -357,6 +358,7 @@ class TrackRun {
         const auto& observations =
             frame->flaw ? tracker.refuse(*frame->flaw) : tracker.track(frame->bgr, frame->time_s);
         tally_.add(observations);
+        for (std::size_t i = 0; i < observations.size(); ++i) tip_frames_[i].add(observations[i], frame->time_s);
         if (registration_.add(observations)) say_moved(options_, *frame);
         lossy_ |= has_jpeg_extension(frame->file);
         diagnosis().add(frame->bgr, observations);
@@ -374,8 +376,12 @@ class TrackRun {
   // Readings of the wrists at the frame's exposure. Once a rig, the reason why an instrument has no tip.
   void set_wrists(Tracker& tracker, const Frame& frame, double came_s) {
     const std::vector<Instrument>& instruments = rigs_.rig()->instruments;
-    const bool is_new = std::exchange(wrists_of_, rigs_.rig()) != rigs_.rig();
-    if (is_new) wrists_.clear();
+    const bool is_new = wrists_of_ != rigs_.rig();
+    if (is_new) {
+      say_without_readings();
+      wrists_of_ = rigs_.rig();
+      wrists_.clear(), tip_frames_.assign(instruments.size(), {});
+    }
     for (std::size_t i = 0; i < instruments.size(); ++i) {
       const Instrument& instrument = instruments[i];
       if (is_new) {
@@ -389,6 +395,15 @@ class TrackRun {
       const bool is_live = live_wrist_ && wrists_[i].none.empty();
       tracker.set_wrist(
           i, is_live ? live_wrist_->at_exposure(instrument, came_s) : wrist_at(wrists_[i], instrument, frame.time_s));
+    }
+  }
+
+  // Once behind the frames of a rig.
+  void say_without_readings() const {
+    for (std::size_t i = 0; i < wrists_.size(); ++i) {
+      const Instrument& instrument = wrists_of_->instruments[i];
+      if (const std::string why = no_reading_text(instrument, wrists_[i], tip_frames_[i]); !why.empty())
+        std::fprintf(stderr, "lapservo: %s: no tip: %s\n", instrument.name.c_str(), why.c_str());
     }
   }
 
@@ -448,7 +463,8 @@ class TrackRun {
   std::optional<OverlayWriter> overlay_;
   std::optional<LiveWrist> live_wrist_;
   std::shared_ptr<const Rig> wrists_of_;
-  std::vector<WristInput> wrists_;  // an instrument, by that rig
+  std::vector<WristInput> wrists_;     // an instrument, by that rig
+  std::vector<TipFrames> tip_frames_;  // likewise
   SteadyClock clock_;
   double begin_s_ = 0;
   Tally tally_;

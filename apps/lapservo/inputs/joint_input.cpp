@@ -148,6 +148,22 @@ std::string no_tip_text(const Instrument& instrument, const WristInput& wrist) {
   return wrist.none;
 }
 
+void TipFrames::add(const Observation& observation, double time_s) {
+  if (!observation.marker) return;
+  if (!first_s) first_s = time_s;
+  last_s = time_s, has_tip |= observation.tip.has_value();
+}
+
+std::string no_reading_text(const Instrument& instrument, const WristInput& wrist, const TipFrames& frames) {
+  if (!wrist.readings || !no_tip_text(instrument, wrist).empty() || !frames.first_s || frames.has_tip) return "";
+  const std::vector<double>& times_s = wrist.readings->recording.time_s;
+  const double delay_s = instrument.image_delay_s.value_or(0);
+  return fmt::format(
+      "{} has no readings around the frames with the marker: they run from {:.2f} to {:.2f} s by its clock, it from "
+      "{:.2f} to {:.2f} s: subtract what time_s has more, or correct the rig's image_delay_s",
+      wrist.readings->source, *frames.first_s - delay_s, frames.last_s - delay_s, times_s.front(), times_s.back());
+}
+
 void add_joint_options(Command command, CalibrateOptions& options, const std::string& help) {
   command.add_option("--joints", options.joints, help);
   add_joint_topic_option(command, options.joint_topic);

@@ -7,6 +7,7 @@
 
 #include "apps/lapservo/commands/calibrate/calibrate_inputs.h"
 #include "lapservo/calibration/recording/joint_recording.h"
+#include "lapservo/vision/observation.h"
 
 namespace lapservo::app {
 
@@ -43,5 +44,17 @@ std::vector<double> wrist_at(const WristInput& wrist, const Instrument& instrume
 std::string other_wrist_text(const std::string& source, const Rig& rig, std::size_t index);
 /// Why an instrument's tip is not known, with the remedy; empty where it is, and without a tool.
 std::string no_tip_text(const Instrument& instrument, const WristInput& wrist);
+
+/// The frames of an instrument in which its marker was measured, and whether one of them has a tip.
+struct TipFrames {
+  std::optional<double> first_s;
+  double last_s = 0;
+  bool has_tip = false;
+
+  void add(const Observation& observation, double time_s);
+};
+/// Why none of these frames has a tip though no_tip_text() is empty: the times of the frames and of the readings; empty
+/// where one has, and without frames or readings.
+std::string no_reading_text(const Instrument& instrument, const WristInput& wrist, const TipFrames& frames);
 
 }  // namespace lapservo::app
