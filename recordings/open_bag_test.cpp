@@ -48,8 +48,7 @@ const auto as_ros2 = [](const auto& message) { return testing::cdr_bytes(message
 
 template <typename Message>
 std::vector<Message> all(const Bag& bag, const std::string& name) {
-  const auto topic =
-      std::find_if(bag.topics().begin(), bag.topics().end(), [&](const BagTopic& one) { return one.name == name; });
+  const auto topic = std::ranges::find(bag.topics(), name, &BagTopic::name);
   std::vector<Message> messages;
   if (topic == bag.topics().end()) return messages;
   const auto from = bag.messages(*topic);

@@ -85,11 +85,10 @@ TEST(Session, HasTheFramesOfItsVideosByTheirRecords) {
   ASSERT_TRUE(is_session(folder.path().string()));
   const auto session = open_session(folder.path().string(), "", {});
   EXPECT_EQ(session.layout, "RL");
-  const auto& frames = session.frames;
-  EXPECT_EQ(frames->first_stamp_s(), 1e-9 * begin_ns);
-  EXPECT_EQ(frames->frame_count(), 9);
-  EXPECT_EQ(times_of(*frames).size(), 9u);
-  EXPECT_EQ(frames->complaint(), "");
+  EXPECT_EQ(session.frames->first_stamp_s(), 1e-9 * begin_ns);
+  EXPECT_EQ(session.frames->frame_count(), 9);
+  EXPECT_EQ(times_of(*session.frames).size(), 9u);
+  EXPECT_EQ(session.frames->complaint(), "");
 }
 
 TEST(Session, TakesTheTimesInTheDocumentedOrder) {
@@ -111,9 +110,8 @@ TEST(Session, TakesTheTimesInTheDocumentedOrder) {
     folder.finish();
     const auto session = open_session(folder.path().string(), "stereo", {});
     EXPECT_EQ(session.layout, "");
-    const auto& frames = session.frames;
-    EXPECT_EQ(frames->first_stamp_s(), 1e-9 * begin_ns) << times(begin_ns);
-    EXPECT_EQ(times_of(*frames).size(), 3u);
+    EXPECT_EQ(session.frames->first_stamp_s(), 1e-9 * begin_ns) << times(begin_ns);
+    EXPECT_EQ(times_of(*session.frames).size(), 3u);
   }
 }
 
@@ -145,9 +143,7 @@ TEST(Session, ThatIsDamagedIsReadOrRefused) {
   folder.add("stereo", 2, 2, "LR");
   folder.finish();
   std::mt19937 random(59);
-  const auto below = [&random](std::size_t count) {
-    return std::uniform_int_distribution<std::size_t>(0, count - 1)(random);
-  };
+  const auto below = [&](std::size_t n) { return std::uniform_int_distribution<std::size_t>(0, n - 1)(random); };
   for (const char* name : {"index.json", "stereo.json"}) {
     const std::string whole = testing::read_file(folder.path() / name);
     for (int i = 0; i < 200; ++i) {

@@ -39,8 +39,7 @@ struct Turn {
     const auto lag_at = [=](double time_s) { return (there_and_back && time_s > 10 ? -0.5 : 0.5) * gap_rad; };
     for (int i = 0; i < 200; ++i) {
       const double time_s = 0.1 * i;
-      recording.time_s.push_back(time_s);
-      recording.joints.push_back({0, 0, 0, (psi_at(time_s) - 0.7) / -1});
+      recording.time_s.push_back(time_s), recording.joints.push_back({0, 0, 0, (psi_at(time_s) - 0.7) / -1});
     }
     calibration.marker = instrument.marker;
     for (int i = 0; i < 60; ++i) {

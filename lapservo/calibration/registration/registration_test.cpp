@@ -294,13 +294,10 @@ TEST(JointRecording, IsRefinedSmoothlyAndKeepsItsPauses) {
   }
   const JointRecording fine = refined(coarse, 5e-3);
   for (std::size_t i = 0; i < fine.time_s.size(); ++i) {
-    if (i > 0) {
-      EXPECT_GT(fine.time_s[i], fine.time_s[i - 1]);
-    }
+    EXPECT_TRUE(i == 0 || fine.time_s[i] > fine.time_s[i - 1]) << i;
     EXPECT_NEAR(fine.joints[i][0], std::sin(3 * fine.time_s[i]), 2e-3);
   }
-  EXPECT_TRUE(fine.at(0.501));
-  EXPECT_FALSE(fine.at(1.5) || fine.at(-0.1) || fine.at(9));
+  EXPECT_TRUE(fine.at(0.501) && !fine.at(1.5) && !fine.at(-0.1) && !fine.at(9));
 }
 
 TEST(PosesInTable, LeavesOutWhatACameraFromRcmBent) {
@@ -315,8 +312,7 @@ TEST(PosesInTable, LeavesOutWhatACameraFromRcmBent) {
     return poses_in_table(path, "A");
   };
   const auto found = read("0,A,ok,," + pose + "1,A,ok,0.3," + pose + "1,B,ok,," + pose + "2,A,cut,,,,,,,,,,,,\n");
-  ASSERT_EQ(found.all.size(), 1U);
-  EXPECT_EQ(found.none, "");
+  ASSERT_TRUE(found.all.size() == 1 && found.none.empty());
   EXPECT_DOUBLE_EQ(found.all[0].marker.sigma_roll_rad, 2e-3);
   EXPECT_TRUE(has(read("1,A,ok,0.3," + pose).none, "its 1 rows were measured with a camera_from_rcm"));
   EXPECT_TRUE(has(read("1,A,ok,,,,,,,,,,,,\n").none, "its 1 rows that are ok have no pose of the marker"));
