@@ -42,9 +42,14 @@ class Kinematics {
 
 RcmEstimate estimate_rcm(const std::vector<Observed>& observations, double common_px) {
   std::vector<LineObservation> lines;
-  for (const Observed& seen : observations)
+  for (const Observed& seen : observations) {
+    const std::string &name = seen.observation.instrument, &first = observations.front().observation.instrument;
+    if (name != first)
+      throw InputError("estimate_rcm", "observations", "of " + first + " and " + name,
+                       "those of one instrument: each has an RCM of its own");
     if (seen.observation.status == Status::ok)
       lines.push_back(line_between(seen.observation.edges_ideal_px[0], seen.observation.edges_ideal_px[3], 1));
+  }
   return estimate_projected_rcm(distinct_lines(lines), {NoiseScale::estimated, common_px});
 }
 
@@ -86,9 +91,11 @@ q is float[4]: theta, phi [rad], rho [m], psi [rad]; features are float[4]: s [r
       .def_readonly("outliers", &RcmEstimate::outliers, "of them")
       .def_readonly("near_parallel", &RcmEstimate::near_parallel, "the estimate is poor along the lines")
       .def_readonly("faults", &RcmEstimate::faults, "list[str]: what shows beyond the noise and the covariance counts");
-  m.def("estimate_rcm", &estimate_rcm, py::arg("observations"), py::kw_only(), py::arg("common_px") = 0.01,
-        "RcmEstimate from one instrument's observations; those that are not ok don't count. They must come from a rig "
-        "without camera_from_rcm, or they show where it has the RCM. common_px: an error that all share.");
+  m.def(
+      "estimate_rcm", &estimate_rcm, py::arg("observations"), py::kw_only(), py::arg("common_px") = 0.01,
+      "RcmEstimate from one instrument's observations; those that are not ok don't count; InputError for several "
+      "instruments'. They must come from a rig without camera_from_rcm, or they show where it has the RCM. common_px: "
+      "an error that all share.");
 }
 
 }  // namespace lapservo::python

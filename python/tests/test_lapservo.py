@@ -187,6 +187,9 @@ def test_the_rcm_is_where_lines_meet(rig):
     assert estimate.status == "ok" and estimate.lines >= 6
     assert np.linalg.norm(off) < 30 and off @ np.linalg.solve(estimate.covariance_px2, off) < 20
     assert lapservo.estimate_rcm(seen[:1]).point_px is None
+    other = lapservo.Rig(rig.camera, [lapservo.Instrument("PSM2", rig.instruments[0].marker)])
+    with pytest.raises(lapservo.InputError, match="of PSM1 and PSM2, expected those of one instrument"):
+        lapservo.estimate_rcm(seen + lapservo.Tracker(other).track(renderer.render(Q)))
 
 
 class Arm(lapservo.Robot):
