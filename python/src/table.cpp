@@ -32,10 +32,13 @@ py::dict dict_of(const Observed& seen) {
   return values;
 }
 
-// A context: what left it without an exception is a whole table.
+// A context: what left it without an exception is a whole table; rows of any other stay in PATH.part.
 class Table {
  public:
   explicit Table(const std::filesystem::path& path) : csv_(std::in_place, path, internal::observation_csv_header) {}
+  Table(const Table&) = delete;
+  Table& operator=(const Table&) = delete;
+  ~Table() { leave_unfinished(); }
 
   void add(const std::vector<Observed>& observations, const Frame* frame) {
     if (!csv_) throw InputError("ObservationCsv.add", "is called after the end of the table's `with`");
@@ -44,17 +47,27 @@ class Table {
         throw InputError("ObservationCsv.add", "stamp_s", "None", "a stamp given to track(), or the Frame");
       csv_->add(internal::observation_csv_row(frame ? frame->index : frames_, frame ? frame->time_s : *seen.stamp_s,
                                               frame ? frame->file.filename().string() : "", seen.observation));
+      has_rows_ = true;
     }
     ++frames_;
   }
   void leave(const py::object& exception) {
-    if (csv_ && exception.is_none()) csv_->commit();
-    csv_.reset();
+    if (csv_ && exception.is_none()) {
+      csv_->commit();
+      csv_.reset();
+    }
+    leave_unfinished();
   }
 
  private:
+  void leave_unfinished() {
+    if (csv_ && has_rows_) csv_->leave();
+    csv_.reset();
+  }
+
   std::optional<internal::RowFile> csv_;  // until its end
   int frames_ = 0;
+  bool has_rows_ = false;
 };
 
 }  // namespace
@@ -66,7 +79,8 @@ void bind_table(py::module_& m) {
   py::class_<Table>(m, "ObservationCsv", R"(The command line's table of observations (docs/output.md).
 
 A context: `with ObservationCsv("obs.csv") as table: table.add(tracker.track(frame), frame)`. The file appears under its
-name at the end; after an exception whatever stood there stays.)")
+name at the end. After an exception, Ctrl-C's too, and without `with`, the rows are in obs.csv.part, and what stood
+under the name stays.)")
       .def(py::init<const std::filesystem::path&>(), py::arg("path"))
       .def("add", &Table::add, py::arg("observations"), py::arg("frame") = py::none(),
            "A row for each Observation of one frame: a Frame, or counted from 0 with the stamps given to track().")

@@ -112,7 +112,7 @@ def test_a_table_is_the_command_lines(folder, tmp_path):
             assert q == (4 * [None] if ours.q is None else ours.q.tolist())
 
 
-def test_a_table_of_arrays_takes_stamps_and_after_an_exception_there_is_none(rig, image, tmp_path):
+def test_a_table_of_arrays_takes_stamps_and_keeps_its_rows_whatever_ends_it(rig, image, tmp_path):
     seen = lapservo.Tracker(rig).track(image, 0.25)
     with lapservo.ObservationCsv(tmp_path / "a.csv") as table:
         table.add(seen)
@@ -123,10 +123,14 @@ def test_a_table_of_arrays_takes_stamps_and_after_an_exception_there_is_none(rig
     assert rows[1].startswith("0,0.250000,,PSM1,ok,") and rows[2].startswith("1,0.250000,,PSM1,ok,") and len(rows) == 3
     with pytest.raises(lapservo.InputError, match="stamp_s"), lapservo.ObservationCsv(tmp_path / "b.csv") as table:
         table.add(lapservo.Tracker(rig).track(image))
-    with pytest.raises(ZeroDivisionError), lapservo.ObservationCsv(tmp_path / "a.csv") as table:
+    with pytest.raises(KeyboardInterrupt), lapservo.ObservationCsv(tmp_path / "a.csv") as table:
         table.add(seen)
-        raise ZeroDivisionError
-    assert (tmp_path / "a.csv").read_text().splitlines() == rows and not (tmp_path / "b.csv").exists()
+        raise KeyboardInterrupt
+    lapservo.ObservationCsv(tmp_path / "c.csv").add(seen)
+    assert (tmp_path / "a.csv").read_text().splitlines() == rows
+    assert {path.name for path in tmp_path.iterdir()} == {"a.csv", "a.csv.part", "c.csv.part"}
+    for name in ("a", "c"):
+        assert (tmp_path / f"{name}.csv.part").read_text().splitlines() == rows[:2]
 
 
 def test_each_status_says_what_it_means():
