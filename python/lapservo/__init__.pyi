@@ -1,5 +1,5 @@
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from types import TracebackType
 from typing import Optional, Union, overload
 
@@ -45,8 +45,8 @@ class Camera:
     width_px: int
     height_px: int
     matrix: _Array
-    distortion: list[float]
-    response: Union[str, float, tuple[list[float], list[float]]]
+    distortion: tuple[float, ...]
+    response: Union[str, float, tuple[tuple[float, ...], tuple[float, ...]]]
     chromatic_aberration: tuple[float, float]
     deinterlace: bool
     sigma_response: Optional[float]
@@ -68,15 +68,15 @@ class Marker:
         gap_rad: float = ...,
     ) -> None: ...
     diameter_m: float
-    hues_deg: list[float]
-    bands_upper_m: list[float]
-    bands_lower_m: list[float]
+    hues_deg: tuple[float, ...]
+    bands_upper_m: tuple[float, ...]
+    bands_lower_m: tuple[float, ...]
     seam_rad: float
     tolerance_m: float
     wrap_m: float
     skew_m: float
     gap_rad: float
-    sigmas: dict[str, Union[float, list[float]]]
+    sigmas: Mapping[str, Union[float, tuple[float, ...]]]
     length_m: float
     def boundaries_m(self, tau_rad: float) -> list[float]: ...
     def cross_ratio(self, tau_rad: float) -> float: ...
@@ -87,9 +87,9 @@ class Marker:
 
 class Joints:
     def __init__(self, names: Sequence[str], *, sign: ArrayLike = ..., offset: ArrayLike = ...) -> None: ...
-    names: list[str]
-    sign: list[float]
-    offset: list[float]
+    names: tuple[str, ...]
+    sign: tuple[float, ...]
+    offset: tuple[float, ...]
 
 class Instrument:
     def __init__(
@@ -106,7 +106,7 @@ class Instrument:
     marker: Marker
     camera_from_rcm: Optional[_Array]
     image_delay_s: Optional[float]
-    wrist_joints: list[str]
+    wrist_joints: tuple[str, ...]
 
 class Rig:
     def __init__(self, camera: Camera, instruments: Sequence[Instrument]) -> None: ...
@@ -115,7 +115,7 @@ class Rig:
     @staticmethod
     def parse(yaml: str, folder: _Path = ...) -> Rig: ...
     camera: Camera
-    instruments: list[Instrument]
+    instruments: tuple[Instrument, ...]
     def save(self, path: _Path) -> None: ...
     def to_yaml(self) -> str: ...
 
@@ -215,7 +215,7 @@ class RcmEstimate:
     lines: int
     outliers: int
     near_parallel: bool
-    faults: list[str]
+    faults: tuple[str, ...]
 
 class JointState:
     def __init__(self, time_s: float, q: ArrayLike, operating_state: str = ..., follows: bool = ...,
@@ -226,7 +226,7 @@ class JointState:
     follows: bool
     started: bool
     blocked: str
-    wrist_rad: list[float]
+    wrist_rad: tuple[float, ...]
 
 class JointPath:
     def copy(self) -> JointPath: ...
@@ -329,7 +329,7 @@ class ControlTick:
     remedy: str
     sent: bool
     image: Optional[_Image]
-    observations: list[Observation]
+    observations: tuple[Observation, ...]
 
 class Renderer:
     def __init__(

@@ -112,6 +112,20 @@ Image array_of(const cv::Mat& bgr) {
   return Image({picture.rows, picture.cols, 3}, {static_cast<int>(picture.step[0]), 3, 1}, picture.data, owner);
 }
 
+py::object read_only(py::object value) {
+  if (py::isinstance<py::array>(value)) value.attr("setflags")(py::arg("write") = false);
+  if (py::isinstance<py::list>(value) || py::isinstance<py::tuple>(value)) {
+    py::list items;
+    for (const py::handle item : value) items.append(read_only(py::reinterpret_borrow<py::object>(item)));
+    return py::tuple(items);
+  }
+  if (!py::isinstance<py::dict>(value)) return value;
+  py::dict items;
+  for (const auto& [key, item] : py::reinterpret_borrow<py::dict>(value))
+    items[key] = read_only(py::reinterpret_borrow<py::object>(item));
+  return py::module_::import("types").attr("MappingProxyType")(items);
+}
+
 Eigen::Matrix4d matrix_of(const Rigid3& a_from_b) {
   Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
   matrix.topLeftCorner<3, 3>() = a_from_b.rotation.toRotationMatrix();

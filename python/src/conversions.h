@@ -3,6 +3,7 @@
 #include <array>
 #include <concepts>
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <pybind11/eigen.h>
 #include <pybind11/numpy.h>
@@ -44,6 +45,15 @@ inline bool is_interrupted() {
 
 /// An array that owns the image.
 Image array_of(const cv::Mat& bgr);
+
+/// A value as an attribute gives it, which is a copy: a change of it would be lost. Arrays can't be written, lists are
+/// tuples, dicts are mappings that can't be written.
+py::object read_only(py::object value);
+/// The getter of such an attribute. `read`: a function of what has it, or its member.
+template <typename Self, typename Read>
+auto read_only(Read read) {
+  return [read](const Self& self) { return read_only(py::cast(std::invoke(read, self))); };
+}
 
 /// A 4 x 4 matrix.
 Eigen::Matrix4d matrix_of(const Rigid3& a_from_b);

@@ -82,15 +82,17 @@ q is float[4]: theta, phi [rad], rho [m], psi [rad]; features are float[4]: s [r
   py::class_<RcmEstimate>(m, "RcmEstimate", "Where the lines along an instrument meet: the RCM's image.")
       .def_property_readonly(
           "status", [](const RcmEstimate& e) { return std::string(to_string(e.status)); }, "'ok', or why there is none")
-      .def_property_readonly("point_px", &point_of, "float[2], ideal pixels; None unless status is 'ok'")
-      .def_property_readonly(
-          "covariance_px2",
-          [](const RcmEstimate& e) { return e.status == RcmStatus::ok ? e.covariance_px2 : std::nullopt; },
-          "float[2, 2]; None when there are too few lines")
+      .def_property_readonly("point_px", read_only<RcmEstimate>(&point_of),
+                             "float[2], ideal pixels; None unless status is 'ok'")
+      .def_property_readonly("covariance_px2", read_only<RcmEstimate>([](const RcmEstimate& e) {
+                               return e.status == RcmStatus::ok ? e.covariance_px2 : std::nullopt;
+                             }),
+                             "float[2, 2]; None when there are too few lines")
       .def_readonly("lines", &RcmEstimate::lines, "positions that differ")
       .def_readonly("outliers", &RcmEstimate::outliers, "of them")
       .def_readonly("near_parallel", &RcmEstimate::near_parallel, "the estimate is poor along the lines")
-      .def_readonly("faults", &RcmEstimate::faults, "list[str]: what shows beyond the noise and the covariance counts");
+      .def_property_readonly("faults", read_only<RcmEstimate>(&RcmEstimate::faults),
+                             "tuple[str]: what shows beyond the noise and the covariance counts");
   m.def(
       "estimate_rcm", &estimate_rcm, py::arg("observations"), py::kw_only(), py::arg("common_px") = 0.01,
       "RcmEstimate from one instrument's observations; those that are not ok don't count; InputError for several "

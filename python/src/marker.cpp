@@ -33,7 +33,7 @@ Paper paper_of(const std::string& word) {
   throw InputError("print_marker", "paper", word, "a4 or letter");
 }
 
-py::dict sigmas_of(const Marker& marker) {
+py::object sigmas_of(const Marker& marker) {
   py::dict sigmas;
   const auto add = [&](const char* name, const auto& sigma) {
     if (sigma) sigmas[name] = py::cast(*sigma);
@@ -43,7 +43,7 @@ py::dict sigmas_of(const Marker& marker) {
   add("bands_upper_m", s.bands_upper_m), add("bands_lower_m", s.bands_lower_m);
   add("seam_rad", s.seam_rad), add("wrap_m", s.wrap_m), add("skew_m", s.skew_m), add("gap_rad", s.gap_rad);
   add("tolerance_m", s.tolerance_m);
-  return sigmas;
+  return read_only(sigmas);
 }
 
 }  // namespace
@@ -57,16 +57,16 @@ void bind_marker(py::module_& m) {
            "Lengths in metres: of the bands at tau = 0 and at the print's other end. InputError for what is no marker "
            "or can't be decoded.")
       .def_readonly("diameter_m", &Marker::diameter_m)
-      .def_readonly("hues_deg", &Marker::hues_deg)
-      .def_readonly("bands_upper_m", &Marker::bands_upper_m)
-      .def_readonly("bands_lower_m", &Marker::bands_lower_m)
+      .def_property_readonly("hues_deg", read_only<Marker>(&Marker::hues_deg))
+      .def_property_readonly("bands_upper_m", read_only<Marker>(&Marker::bands_upper_m))
+      .def_property_readonly("bands_lower_m", read_only<Marker>(&Marker::bands_lower_m))
       .def_readonly("seam_rad", &Marker::seam_rad)
       .def_readonly("tolerance_m", &Marker::tolerance_m)
       .def_readonly("wrap_m", &Marker::wrap_m)
       .def_readonly("skew_m", &Marker::skew_m)
       .def_readonly("gap_rad", &Marker::gap_rad)
       .def_property_readonly("sigmas", &sigmas_of,
-                             "dict of one standard deviation each, of those of its numbers that were measured")
+                             "mapping of one standard deviation each, of those of its numbers that were measured")
       .def_property_readonly("length_m", &Marker::length_m)
       .def("boundaries_m", &boundaries_m, py::arg("tau_rad"),
            "e0 to e3 along the axis from the proximal end at tau = 0")

@@ -52,7 +52,7 @@ py::object response_to_python(const Response& response) {
     case Response::Kind::table:
       break;
   }
-  return py::make_tuple(response.table_light, response.table_value);
+  return read_only(py::make_tuple(response.table_light, response.table_value));
 }
 
 std::array<double, 5> distortion_of(const Eigen::VectorXd& given) {
@@ -108,8 +108,8 @@ matrix.)");
            "magnification of blue and of red beside green's; sigma_response: of a response that was measured.")
       .def_readonly("width_px", &Camera::width_px)
       .def_readonly("height_px", &Camera::height_px)
-      .def_property_readonly("matrix", &matrix_of_camera, "float[3, 3], px")
-      .def_readonly("distortion", &Camera::distortion, "k1 k2 p1 p2 k3")
+      .def_property_readonly("matrix", read_only<Camera>(&matrix_of_camera), "float[3, 3], px")
+      .def_property_readonly("distortion", read_only<Camera>(&Camera::distortion), "k1 k2 p1 p2 k3")
       .def_property_readonly("response", [](const Camera& camera) { return response_to_python(camera.response); })
       .def_property_readonly("chromatic_aberration",
                              [](const Camera& camera) {
@@ -160,9 +160,9 @@ q = sign * joints + offset, rad and m.)");
            }),
            py::arg("names"), py::kw_only(), py::arg("sign") = Joints{}.sign, py::arg("offset") = Joints{}.offset,
            "names: of the four columns of a recording; sign: 1 or -1 each; offset: rad, rad, m, rad.")
-      .def_readonly("names", &Joints::names)
-      .def_readonly("sign", &Joints::sign)
-      .def_readonly("offset", &Joints::offset, "rad, rad, m, rad")
+      .def_property_readonly("names", read_only<Joints>(&Joints::names))
+      .def_property_readonly("sign", read_only<Joints>(&Joints::sign))
+      .def_property_readonly("offset", read_only<Joints>(&Joints::offset), "rad, rad, m, rad")
       .def("__repr__",
            [](const Joints& joints) { return fmt::format("<lapservo.Joints {}>", fmt::join(joints.names, ", ")); });
   bind_state(joints_type);
@@ -174,15 +174,17 @@ q = sign * joints + offset, rad and m.)");
       .def_readonly("joints", &Instrument::joints, "Joints; None where the rig doesn't say")
       .def_readonly("name", &Instrument::name)
       .def_readonly("marker", &Instrument::marker)
-      .def_property_readonly(
-          "camera_from_rcm", [](const Instrument& instrument) { return matrix_of(instrument.camera_from_rcm); },
-          "float[4, 4], metres; None where the rig doesn't say")
+      .def_property_readonly("camera_from_rcm", read_only<Instrument>([](const Instrument& instrument) {
+                               return matrix_of(instrument.camera_from_rcm);
+                             }),
+                             "float[4, 4], metres; None where the rig doesn't say")
       .def_property_readonly(
           "image_delay_s", [](const Instrument& instrument) { return instrument.image_delay_s; },
           "a frame's stamp minus the joints' clock at its exposure, or None")
       .def_property_readonly(
-          "wrist_joints", [](const Instrument& instrument) { return internal::wrist_names(instrument.tool); },
-          "list[str]: the joints of the tool's wrist, in the order of Tracker.set_wrist; empty for a straight tool")
+          "wrist_joints",
+          read_only<Instrument>([](const Instrument& instrument) { return internal::wrist_names(instrument.tool); }),
+          "tuple[str]: the joints of the tool's wrist, in the order of Tracker.set_wrist; empty for a straight tool")
       .def("__repr__", [](const Instrument& instrument) { return "<lapservo.Instrument '" + instrument.name + "'>"; });
 }
 
@@ -208,7 +210,8 @@ towards the tip.)");
   py::class_<Rig, std::shared_ptr<Rig>> type(m, "Rig", R"(What stands before which camera.
 
 `Rig.load("rig.yaml")`, `Rig.parse(text)`, or `Rig(camera, instruments)`. Everything is checked: errors are InputError
-with the field, its value and what was expected.)");
+with the field, its value and what was expected. A rig and its parts can't be changed: another one is made of copies of
+its arrays and tuples.)");
   bind_state(type);
   type.def(py::init([](const Camera& camera, const std::vector<Instrument>& instruments) {
              // The checks of files apply to values, too.
@@ -226,7 +229,7 @@ with the field, its value and what was expected.)");
           py::arg("yaml"), py::arg("folder") = ".",
           "The same from text; `folder` is where a camera file is looked for.")
       .def_readonly("camera", &Rig::camera)
-      .def_readonly("instruments", &Rig::instruments)
+      .def_property_readonly("instruments", read_only<Rig>(&Rig::instruments))
       .def(
           "save",
           [](const Rig& rig, const std::filesystem::path& path) {

@@ -113,14 +113,15 @@ void bind_ports(py::module_& m) {
            "for; blocked: why else the arm must not be moved, for example 'busy' or 'not_homed'; wrist_rad: readings "
            "of the instrument's wrist_joints, in their order, without which its tip is not known.")
       .def_readonly("time_s", &JointState::time_s)
-      .def_property_readonly(
-          "q", [](const JointState& self) { return self.q.vector(); }, "float[4]")
+      .def_property_readonly("q", read_only<JointState>([](const JointState& self) { return self.q.vector(); }),
+                             "float[4]")
       .def_property_readonly("operating_state",
                              [](const JointState& self) { return std::string(to_string(self.operating_state)); })
       .def_readonly("follows", &JointState::follows)
       .def_readonly("started", &JointState::started)
       .def_property_readonly("blocked", [](const JointState& self) { return std::string(to_string(self.blocked)); })
-      .def_readonly("wrist_rad", &JointState::wrist_rad, "list[float]; empty where the arm does not measure them");
+      .def_property_readonly("wrist_rad", read_only<JointState>(&JointState::wrist_rad),
+                             "tuple[float]; empty where the arm does not measure them");
 
   py::class_<JointPath>(m, "JointPath",
                         R"(Setpoints over time. Where no newer path comes it brakes to rest by itself.)")
@@ -300,10 +301,10 @@ class PythonObserver : public RunObserver {
 // A member of the estimate for now; None without one.
 template <typename Member>
 auto of_estimate(Member member) {
-  return [member](const Tick& self) {
+  return read_only<Tick>([member](const Tick& self) {
     const auto& estimate = self.step().estimate;
     return estimate ? std::optional(*estimate.*member) : std::nullopt;
-  };
+  });
 }
 
 void bind_tick(py::module_& m) {
@@ -311,23 +312,24 @@ void bind_tick(py::module_& m) {
       .def_property_readonly("time_s", [](const Tick& self) { return self.tick.input.time_s; })
       .def_property_readonly(
           "joints", [](const Tick& self) { return self.tick.input.joints; }, "JointState")
-      .def_property_readonly(
-          "desired", [](const Tick& self) { return self.tick.input.desired.features; }, "float[4]: s, r, l, d")
+      .def_property_readonly("desired",
+                             read_only<Tick>([](const Tick& self) { return self.tick.input.desired.features; }),
+                             "float[4]: s, r, l, d")
       .def_property_readonly(
           "action", [](const Tick& self) { return std::string(to_string(self.step().action)); },
           "'track', 'probe' or 'hold'")
       .def_property_readonly(
           "hold_reason", [](const Tick& self) { return std::string(to_string(self.step().reason)); },
           "'none' unless it holds")
-      .def_property_readonly(
-          "error",
-          [](const Tick& self) { return self.step().estimate ? std::optional(self.step().error) : std::nullopt; },
-          "float[4]: estimated features less the desired ones; None without an estimate")
+      .def_property_readonly("error", read_only<Tick>([](const Tick& self) {
+                               return self.step().estimate ? std::optional(self.step().error) : std::nullopt;
+                             }),
+                             "float[4]: estimated features less the desired ones; None without an estimate")
       .def_property_readonly("features", of_estimate(&Estimate::features),
                              "float[4]: estimated for now; None without an estimate")
       .def_property_readonly("q", of_estimate(&Estimate::q), "float[4]: estimated for now; None without an estimate")
-      .def_property_readonly(
-          "velocity", [](const Tick& self) { return self.step().velocity; }, "float[4], of the joints: rad/s, m/s")
+      .def_property_readonly("velocity", read_only<Tick>([](const Tick& self) { return self.step().velocity; }),
+                             "float[4], of the joints: rad/s, m/s")
       .def_property_readonly(
           "delay_s", [](const Tick& self) { return self.step().delay_s; }, "of the images, estimated")
       .def_property_readonly("registration_contradicted",
@@ -343,13 +345,12 @@ void bind_tick(py::module_& m) {
             return array_of(self.tick.seen->image.bgr);
           },
           "uint8[H, W, 3] that came since the tick before, or None")
-      .def_property_readonly(
-          "observations",
-          [](const Tick& self) {
-            if (!self.tick.seen) return std::vector<Observed>{};
-            return observed(self.tick.seen->observations, self.rig_seen_by(), self.tick.seen->image.time_s);
-          },
-          "list[Observation] of that image");
+      .def_property_readonly("observations", read_only<Tick>([](const Tick& self) {
+                               if (!self.tick.seen) return std::vector<Observed>{};
+                               return observed(self.tick.seen->observations, self.rig_seen_by(),
+                                               self.tick.seen->image.time_s);
+                             }),
+                             "tuple[Observation] of that image");
 }
 
 void run_loop(Robot& robot, ImageStream& images, Clock& clock, const std::shared_ptr<Rig>& rig,

@@ -102,8 +102,9 @@ commands give the same frames.)")
            py::arg("backlash") = arm.backlash,
            "q: float[4], the measured joints at the start; joint_offset: instrument less measured joints.")
       .def("step", &Simulator::step, py::arg("dt_s"), "Lets time pass.")
-      .def_property_readonly(
-          "true_q", [](const Simulator& self) { return self.true_q().vector(); }, "float[4]: where the instrument is")
+      .def_property_readonly("true_q",
+                             read_only<Simulator>([](const Simulator& self) { return self.true_q().vector(); }),
+                             "float[4]: where the instrument is")
       .def("set_light", &Simulator::set_light, py::arg("light"), "On the scene from now on; 1 is usual.")
       .def(
           "cover_marker",

@@ -59,7 +59,7 @@ auto when_ok(Read read) {
       else
         return seen.observation.*read;
     };
-    return is_ok(seen) ? std::optional(value()) : std::nullopt;
+    return is_ok(seen) ? read_only(py::cast(value())) : py::none();
   };
 }
 
@@ -130,9 +130,9 @@ void bind_observation(py::module_& m) {
 Origin at the marker's proximal end on the axis, z along the axis to the tip, x towards tau = 0.)");
   bind_state(pose_type);
   pose_type
-      .def_property_readonly(
-          "camera_from_marker", [](const Pose& pose) { return matrix_of(pose.camera_from_marker); },
-          "float[4, 4], metres")
+      .def_property_readonly("camera_from_marker",
+                             read_only<Pose>([](const Pose& pose) { return matrix_of(pose.camera_from_marker); }),
+                             "float[4, 4], metres")
       .def_readonly("sigma_xy_m", &Pose::sigma_xy_m, "of the origin, across the camera's axis")
       .def_readonly("sigma_z_m", &Pose::sigma_z_m, "of its depth")
       .def_readonly("sigma_axis_rad", &Pose::sigma_axis_rad, "of the angle between the axis and the true one")
@@ -148,8 +148,9 @@ Origin at the marker's proximal end on the axis, z along the axis to the tip, x 
   py::class_<Tip> tip_type(m, "TipPose", "The pose of the tip behind the marker, by the rig's tool.");
   bind_state(tip_type);
   tip_type
-      .def_property_readonly(
-          "camera_from_tip", [](const Tip& tip) { return matrix_of(tip.camera_from_tip); }, "float[4, 4], metres")
+      .def_property_readonly("camera_from_tip",
+                             read_only<Tip>([](const Tip& tip) { return matrix_of(tip.camera_from_tip); }),
+                             "float[4, 4], metres")
       .def_readonly("covariance", &Tip::covariance,
                     "float[6, 6]: of the position [m] and a rotation vector [rad], in the camera's axes")
       .def_property_readonly("sigma_m", &Tip::sigma_m, "of the distance from the true tip; its parts:")

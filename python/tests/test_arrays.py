@@ -130,7 +130,7 @@ def test_a_vector_may_lie_as_it_likes(rig, shape, dtype):
 @pytest.mark.parametrize("shape", [(-1,), (1, -1), (-1, 1)])
 def test_distortion_is_taken_as_opencv_and_files_have_it(distortion, shape):
     camera = lapservo.Camera(1280, 720, K, distortion=np.array(distortion, float).reshape(shape))
-    assert camera.distortion == (distortion + 5 * [0])[:5]
+    assert camera.distortion == tuple((distortion + 5 * [0])[:5])
 
 
 @pytest.mark.parametrize(("distortion", "expected"), [

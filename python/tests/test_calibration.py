@@ -48,7 +48,7 @@ def test_a_registration_is_the_command_lines(recordings, swing):
     expect_whole(result, recordings.rig)
     assert np.allclose(result.camera_from_rcm[:3, 3], recordings.rig.instruments[0].camera_from_rcm[:3, 3], atol=5e-4)
     assert result.image_delay_s == pytest.approx(DELAY_S, abs=5e-3) and result.residuals.shape == (72, 4)
-    assert result.joints.names == ["yaw", "pitch", "insertion", "roll"] and set(result.joints.sign) == {1}
+    assert result.joints.names == ("yaw", "pitch", "insertion", "roll") and set(result.joints.sign) == {1}
 
 
 def test_colours_are_the_command_lines(recordings, swing):

@@ -31,7 +31,7 @@ def test_the_tip_follows_the_wrist(rig, image):
     wrist = ("    tool: {joints: [{name: wrist_pitch, alpha_rad: -1.570796326795}], tip_in_last_joint_m: [0.01, 0, 0], "
              "wrist_in_marker_m: [0, 0, 0.03], azimuth_rad: 0}\n")
     wristed = lapservo.Rig.parse(rig.to_yaml() + wrist)
-    assert wristed.instruments[0].wrist_joints == ["wrist_pitch"] and rig.instruments[0].wrist_joints == []
+    assert wristed.instruments[0].wrist_joints == ("wrist_pitch",) and rig.instruments[0].wrist_joints == ()
     tracker = lapservo.Tracker(wristed)
     assert tracker.track(image)[0].tip is None
     tracker.set_wrist("PSM1", [-np.pi / 2])
@@ -40,7 +40,7 @@ def test_the_tip_follows_the_wrist(rig, image):
     assert np.allclose(tip.camera_from_tip[:3, 3], (seen.marker_pose.camera_from_marker @ [0, 0, 0.04, 1])[:3])
     assert np.all(np.linalg.eigvalsh(tip.covariance) > 0) and np.isclose(tip.sigma_m**2, np.trace(tip.covariance[:3, :3]))
     assert np.isclose(tip.sigma_readings_m, 0.01 * np.pi / 180) and tip.sigma_place_m == 0 < tip.sigma_shaft_m
-    assert lapservo.JointState(0, Q, wrist_rad=[0.5]).wrist_rad == [0.5] and lapservo.JointState(0, Q).wrist_rad == []
+    assert lapservo.JointState(0, Q, wrist_rad=[0.5]).wrist_rad == (0.5,) and lapservo.JointState(0, Q).wrist_rad == ()
     assert lapservo.Simulator(wristed, Q).state().wrist_rad == pytest.approx([0.1])
     assert pickle.loads(pickle.dumps(seen)) == seen and pickle.loads(pickle.dumps(wristed)) == wristed
     for readings in ([1.0, 2.0], [np.nan]):

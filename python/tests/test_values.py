@@ -13,7 +13,7 @@ import sys
 
 import numpy as np
 import pytest
-from conftest import SOURCE
+from conftest import Q, SOURCE
 from test_lapservo import free
 
 import lapservo
@@ -62,6 +62,22 @@ def test_what_differs_is_not_equal(rig, image, tmp_path):
         shutil.copy(folder / "a.png", tmp_path / "a.png")
         frames.append(next(iter(lapservo.open_frames(tmp_path / "a.png"))))
     assert frames[0] != frames[1] and repr(frames[0]) == repr(frames[1])
+
+
+def test_what_attributes_give_is_not_changed_in_vain(values, rig):
+    measured, simulator = values[2].instruments[0].marker, lapservo.Simulator(rig, Q)
+    for thing in [*values, measured, simulator, simulator.state()]:
+        for name in dir(thing):
+            given = None if name.startswith("_") or name == "image" else getattr(thing, name)
+            assert not isinstance(given, (list, dict)), name
+            assert not isinstance(given, np.ndarray) or not given.flags.writeable, name
+    with pytest.raises(ValueError, match="read-only"):
+        rig.instruments[0].camera_from_rcm[0, 3] += 0.01
+    assert hash(values[4].response), "tuples of tuples"
+    with pytest.raises(TypeError, match="item assignment"):
+        measured.sigmas["diameter_m"] = 0
+    with pytest.raises(AttributeError, match="append"):
+        rig.instruments.append(rig.instruments[0])
 
 
 def test_a_pickled_observation_is_whole(rig, image):
