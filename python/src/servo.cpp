@@ -339,12 +339,12 @@ void bind_tick(py::module_& m) {
           "The fault and its remedy, where a person has to act; else empty")
       .def_property_readonly("sent", [](const Tick& self) { return self.tick.decision.send; })
       .def_property_readonly(
-          "image",
-          [](const Tick& self) -> std::optional<Image> {
+          "image", read_only<Tick>([](const Tick& self) -> std::optional<Image> {
             if (!self.tick.seen) return std::nullopt;
             return array_of(self.tick.seen->image.bgr);
-          },
-          "uint8[H, W, 3] that came since the tick before, or None")
+          }),
+          "uint8[H, W, 3] that came since the tick before, or None. It can't be written: the loop compares the next "
+          "image with it, so draw in a copy. A tick that is kept keeps it")
       .def_property_readonly("observations", read_only<Tick>([](const Tick& self) {
                                if (!self.tick.seen) return std::vector<Observed>{};
                                return observed(self.tick.seen->observations, self.rig_seen_by(),

@@ -279,6 +279,8 @@ def test_a_run_ends_when_told(rig):
     assert len(ticks) == 20 and simulator.now_s() < 5
     seen = [tick for tick in ticks if tick.image is not None]
     assert seen and seen[0].observations[0].ok and seen[0].image.shape == (720, 1280, 3)
+    with pytest.raises(ValueError, match="read-only"):
+        seen[0].image[0, 0] = 0
     assert ticks[0].action == "hold" and ticks[0].hold_reason == "no_image_yet" and ticks[0].error is None
 
 
