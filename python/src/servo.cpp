@@ -165,7 +165,8 @@ own rate, and forgets it as soon as it is not enabled.)")
             if (!image) return std::nullopt;
             return std::pair(image->time_s, array_of(image->bgr));
           },
-          R"((time_s, uint8[H, W, 3]) that came since the last call, or None. Must not block.
+          R"((time_s, uint8[H, W, 3]) that came since the last call, or None. Must not block: with own_thread
+it is called up to 2000 times a second.
 
 time_s, on the loop's clock: of the exposure where it is known (then set the controller's delay_s to 0), else of the
 arrival.)");
