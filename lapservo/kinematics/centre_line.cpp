@@ -38,7 +38,8 @@ Features features_of(const std::array<Eigen::Vector2d, 4>& e, const std::optiona
 }
 
 Eigen::Matrix4d features_covariance(const std::array<Eigen::Vector2d, 4>& e, const EdgesCovariance& covariance_px2,
-                                    const std::optional<Eigen::Vector2d>& rcm_ideal_px) {
+                                    const std::optional<Eigen::Vector2d>& rcm_ideal_px,
+                                    const Eigen::Matrix2d& rcm_covariance_px2) {
   const Eigen::Vector2d whole = e[3] - e[0], inner = e[2] - e[0];
   Eigen::Matrix<double, 4, 8> by_points = Eigen::Matrix<double, 4, 8>::Zero();
   const auto point = [&](int feature, Eigen::Index k) { return by_points.block<1, 2>(feature, 2 * k); };
@@ -47,7 +48,9 @@ Eigen::Matrix4d features_covariance(const std::array<Eigen::Vector2d, 4>& e, con
   point(3, 2) = inner.normalized().transpose();
   for (const int feature : {0, 2, 3}) point(feature, 0) = -(point(feature, 2) + point(feature, 3));
   if (rcm_ideal_px) point(1, 0) = (e[0] - *rcm_ideal_px).normalized().transpose();
-  const Eigen::Matrix4d covariance = by_points * covariance_px2 * by_points.transpose();
+  Eigen::Matrix4d covariance = by_points * covariance_px2 * by_points.transpose();
+  const Eigen::Vector2d by_rcm = point(1, 0).transpose();
+  covariance(1, 1) += by_rcm.dot(rcm_covariance_px2 * by_rcm);
   // Symmetric to the last bit: a log holds one half of it.
   return 0.5 * (covariance + covariance.transpose());
 }
@@ -55,6 +58,20 @@ Eigen::Matrix4d features_covariance(const std::array<Eigen::Vector2d, 4>& e, con
 std::optional<Eigen::Vector2d> projected_rcm_px(const Camera& camera, const Rigid3& camera_from_rcm) {
   if (!(std::abs(camera_from_rcm.translation.z()) > 1e-6)) return std::nullopt;
   return camera.ideal_from_point(camera_from_rcm.translation);
+}
+
+Eigen::Matrix2d projected_rcm_covariance_px2(const Camera& camera, const Rigid3& camera_from_rcm,
+                                             const Eigen::Matrix3d& place_covariance_m2) {
+  const Eigen::Vector3d& rcm = camera_from_rcm.translation;
+  const CameraSigmas& sigma = camera.sigmas;
+  Eigen::Matrix4d of_matrix =
+      Eigen::Vector4d(sigma.fx_px, sigma.fy_px, sigma.cx_px, sigma.cy_px).cwiseAbs2().asDiagonal();
+  of_matrix(0, 1) = of_matrix(1, 0) = sigma.fx_px * sigma.fy_px / 3;  // as Camera::covariance says
+  if (camera.covariance) of_matrix = camera.covariance->topLeftCorner<4, 4>();
+  Eigen::Matrix<double, 2, 4> by_matrix;
+  by_matrix << rcm.x() / rcm.z(), 0, 1, 0, 0, rcm.y() / rcm.z(), 0, 1;
+  const Eigen::Matrix<double, 2, 3> by_place = camera.ideal_with_jacobian(rcm).d_px_d_point;
+  return by_place * place_covariance_m2 * by_place.transpose() + by_matrix * of_matrix * by_matrix.transpose();
 }
 
 }  // namespace lapservo::internal

@@ -30,12 +30,19 @@ Features features_of(const std::array<Eigen::Vector2d, 4>& edges_ideal_px,
                      const std::optional<Eigen::Vector2d>& rcm_ideal_px);
 
 /// Covariance of s_rad, r_px, l_px, d_px, to first order, of points with that covariance. r's row and column are zero
-/// where the RCM's image is unknown; where it is known, it counts as exact.
+/// where the RCM's image is unknown; where it is known, it has `rcm_covariance_px2`, independently of the points.
+/// Whoever compares r with a model of the same RCM leaves that out: its error is in both.
 Eigen::Matrix4d features_covariance(const std::array<Eigen::Vector2d, 4>& edges_ideal_px,
                                     const EdgesCovariance& covariance_px2,
-                                    const std::optional<Eigen::Vector2d>& rcm_ideal_px);
+                                    const std::optional<Eigen::Vector2d>& rcm_ideal_px,
+                                    const Eigen::Matrix2d& rcm_covariance_px2 = Eigen::Matrix2d::Zero());
 
 /// Image of the RCM; algebraic (mirrored) when it lies behind the camera, nullopt when in its focal plane.
 std::optional<Eigen::Vector2d> projected_rcm_px(const Camera& camera, const Rigid3& camera_from_rcm);
+
+/// Covariance of that image, to first order: by what the camera's sigmas say of its matrix, and by the covariance of
+/// the RCM's place in the camera frame. Not for an RCM in the focal plane.
+Eigen::Matrix2d projected_rcm_covariance_px2(const Camera& camera, const Rigid3& camera_from_rcm,
+                                             const Eigen::Matrix3d& place_covariance_m2);
 
 }  // namespace lapservo::internal

@@ -19,7 +19,8 @@ FeatureModel feature_model(const Rig& rig);
 FeatureModel feature_model(const Rig& rig, const std::optional<Rigid3>& camera_from_rcm);
 
 /// The controller's measurement from an observation. Valid only when all four features are known, r from `rcm_px`, the
-/// RCM's image in ideal pixels. The covariance is that of the fitted points, propagated to the features.
+/// RCM's image in ideal pixels. The covariance is that of the fitted points, propagated to the features: the RCM counts
+/// as exact, as the controller's model has the same one.
 ImageMeasurement measurement_of(const Observation& observation, double stamp_s,
                                 const std::optional<Eigen::Vector2d>& rcm_px);
 

@@ -277,6 +277,7 @@ struct Tick {
     auto moved = std::make_shared<Rig>(*rig);
     const bool current = tick.seen->measurement.registration == tick.decision.registration;
     moved->instruments.front().camera_from_rcm = current ? tick.decision.camera_from_rcm : std::nullopt;
+    if (current) moved->instruments.front().registration_covariance = tick.decision.registration_covariance;
     return moved;
   }
 };

@@ -16,6 +16,7 @@
 #include "lapservo/io/pictures/png_picture.h"
 #include "lapservo/kinematics/centre_line.h"
 #include "lapservo/rig/instruments.h"
+#include "lapservo/rig/registration_covariance.h"
 #include "python/src/bindings.h"
 #include "python/src/conversions.h"
 #include "python/src/observed.h"
@@ -31,12 +32,6 @@ Points points_of(const std::array<Eigen::Vector2d, 4>& edges) {
   Points points;
   for (int i = 0; i < 4; ++i) points.row(i) = edges[static_cast<std::size_t>(i)].transpose();
   return points;
-}
-
-std::optional<Eigen::Vector2d> rcm_px(const Observed& seen) {
-  const auto index = internal::instrument_index(*seen.rig, seen.observation.instrument);
-  if (!index || !seen.rig->instruments[*index].camera_from_rcm) return std::nullopt;
-  return internal::projected_rcm_px(seen.rig->camera, *seen.rig->instruments[*index].camera_from_rcm);
 }
 
 bool is_ok(const Observed& seen) {
@@ -79,9 +74,18 @@ Eigen::Vector4d features_of(const Observed& seen) {
 }
 
 Eigen::Matrix4d features_covariance_of(const Observed& seen) {
-  const auto rcm = seen.observation.features.r_px ? rcm_px(seen) : std::nullopt;
-  Eigen::Matrix4d covariance =
-      internal::features_covariance(seen.observation.edges_ideal_px, seen.observation.edges_covariance_px2, rcm);
+  const Observation& o = seen.observation;
+  const Camera& camera = seen.rig->camera;
+  const auto index = internal::instrument_index(*seen.rig, o.instrument);
+  const Instrument instrument = index ? seen.rig->instruments[*index] : Instrument{};
+  std::optional<Eigen::Vector2d> rcm;
+  Eigen::Matrix2d of_rcm = Eigen::Matrix2d::Zero();
+  if (const auto& at = instrument.camera_from_rcm; at && o.features.r_px) {
+    rcm = internal::projected_rcm_px(camera, *at);
+    const auto registered = internal::registration_covariance(instrument);
+    if (rcm) of_rcm = internal::projected_rcm_covariance_px2(camera, *at, registered.topLeftCorner<3, 3>());
+  }
+  Eigen::Matrix4d covariance = internal::features_covariance(o.edges_ideal_px, o.edges_covariance_px2, rcm, of_rcm);
   if (!rcm) {
     covariance.row(1).setConstant(std::numeric_limits<double>::quiet_NaN());
     covariance.col(1).setConstant(std::numeric_limits<double>::quiet_NaN());
@@ -175,8 +179,10 @@ Sigmas are one standard deviation. Of an observation whose status is not ok, eve
       .def_property_readonly("q_covariance", when_ok(&q_covariance_of), "float[4, 4], of q")
       .def_property_readonly("features", when_ok(&features_of),
                              "float[4]: s [rad], r, l, d [px] (eq. 12 to 15); r is NaN where the RCM is unknown")
-      .def_property_readonly("features_covariance", when_ok(&features_covariance_of),
-                             "float[4, 4], of features, to first order; r's row and column are NaN where r is")
+      .def_property_readonly(
+          "features_covariance", when_ok(&features_covariance_of),
+          "float[4, 4], of features, to first order; r's with what the rig's sigmas say of camera_from_rcm and "
+          "the camera's matrix; its row and column are NaN where r is")
       .def_property_readonly("cross_ratio",
                              when_ok([](const Observed& seen) { return seen.observation.features.cross_ratio; }))
       .def_property_readonly("tau_rad", when_ok(&Observation::tau_rad),

@@ -98,6 +98,16 @@ def test_sigmas_are_roots_of_covariances(rig, image):
     assert set(lapservo.Tracker(rig).track(np.full_like(image, 90))[0].sigma) == {None}
 
 
+def test_sigma_of_r_has_what_the_rig_says_of_the_rcm(rig, image):
+    sigmas, text = [0.001, 0.002, 0.003], rig.to_yaml()
+    text = re.sub("^( +)(translation_m:)", rf"\1sigma_translation_m: {sigmas}\n\1\2", text, flags=re.MULTILINE)
+    (x, y, z), (fx, fy) = rig.instruments[0].camera_from_rcm[:3, 3], np.diag(rig.camera.matrix)[:2]
+    seen = lapservo.Tracker(lapservo.Rig.parse(text)).track(image)[0]
+    along_px = seen.edges_ideal_px[0] - [fx * x / z, fy * y / z] - rig.camera.matrix[:2, 2]
+    moved_px = along_px / np.linalg.norm(along_px) @ np.array([[fx, 0, -fx * x / z], [0, fy, -fy * y / z]]) / z * sigmas
+    assert seen.sigma.r == pytest.approx(np.linalg.norm(moved_px), rel=1e-3)
+
+
 @pytest.mark.parametrize("folder", sorted(p.parent for p in (SOURCE / "acceptance" / "frames").glob("*/rig.yaml")),
                          ids=lambda folder: folder.name)
 def test_a_table_is_the_command_lines(folder, tmp_path):
