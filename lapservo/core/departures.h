@@ -34,7 +34,7 @@ struct Fault {
   std::size_t which;
   double size, sigma;
   /// Beyond chance also with `freedom`, `alike` and the residuals outside of the groups, which are priors with a sigma
-  /// of 1. What is seen without that may be there, so sigmas count it; it is no cause to name.
+  /// of 1. A fault that is seen without that may be there: sigmas count it, but it is no cause to name.
   bool is_clear = true;
 };
 

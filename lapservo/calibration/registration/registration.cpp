@@ -22,7 +22,7 @@ namespace {
 // Largest sigmas of a registration that may be written.
 constexpr double max_sigma_m = 3e-3, max_sigma_rad = 0.02;
 
-// In the frames' own sigmas; up to as much, residuals that are honest scatter.
+// In the frames' own sigmas: up to as much, residuals are no misfit of the model.
 constexpr double most_noise = 1.5;
 
 constexpr double unmodelled = unmodelled_sigmas * unmodelled_sigmas;  // times the variance
@@ -63,7 +63,7 @@ Eigen::Quaterniond usual_rotation(const std::vector<TimedPose>& poses) {
   return Eigen::Quaterniond(axes).normalized();
 }
 
-// What is common to all frames is indistinguishable from psi's offset.
+// An error that is common to all frames is indistinguishable from psi's offset.
 double common_turn_rad(const std::vector<TimedPose>& poses) {
   return common_roll_part * median(values_of(poses, [](const TimedPose& pose) { return pose.marker.sigma_roll_rad; }));
 }

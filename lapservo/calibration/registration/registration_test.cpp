@@ -216,7 +216,7 @@ TEST(RegisterArm, NamesTheJointWhoseScaleIsFarOff) {
   }
 }
 
-// As compressed pictures have it: psi off with the shaft's direction, by a part of what the frames say of themselves.
+// As in compressed images: psi is off with the shaft's direction, by a part of the frames' own sigma.
 TEST(RegisterArm, NamesNoCauseThatTheFramesOwnErrorsExplain) {
   constexpr double by_yaw = 0.04;  // rad/rad
   for (const auto& [sigma_rad, is_named] : {std::pair{1e-3, true}, std::pair{15e-3, false}}) {
