@@ -12,9 +12,10 @@ from matplotlib import pyplot
 
 if len(sys.argv) != 4:
     sys.exit(__doc__)
-tracker = lapservo.Tracker(lapservo.Rig.load(sys.argv[2]), frame_budget=None)
+rig = lapservo.Rig.load(sys.argv[2])
+tracker = lapservo.Tracker(rig, frame_budget=None)
 rows = []
-for frame in lapservo.open_frames(sys.argv[1]):
+for frame in lapservo.open_frames(sys.argv[1], deinterlaced=rig.camera.deinterlace):
     seen = tracker.track(frame)[0]
     if seen.q is not None and seen.q_covariance is not None:
         rows.append(np.concatenate([[frame.time_s], seen.q, np.sqrt(np.diag(seen.q_covariance))]))

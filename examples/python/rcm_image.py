@@ -9,7 +9,7 @@ if len(sys.argv) != 3:
 rig = lapservo.Rig.load(sys.argv[2])
 free = lapservo.Rig(rig.camera, [lapservo.Instrument(i.name, i.marker) for i in rig.instruments])
 tracker = lapservo.Tracker(free, frame_budget=None)
-seen = [tracker.track(frame)[0] for frame in lapservo.open_frames(sys.argv[1])]
+seen = [tracker.track(frame)[0] for frame in lapservo.open_frames(sys.argv[1], deinterlaced=rig.camera.deinterlace)]
 estimate = lapservo.estimate_rcm(seen)
 if estimate.point_px is None:
     sys.exit(f"no estimate: {estimate.status}")

@@ -8,7 +8,7 @@ if len(sys.argv) != 3:
     sys.exit(__doc__)
 rig = lapservo.Rig.load(sys.argv[2])
 tracker = lapservo.Tracker(rig, frame_budget=None)
-for frame in lapservo.open_frames(sys.argv[1]):
+for frame in lapservo.open_frames(sys.argv[1], deinterlaced=rig.camera.deinterlace):
     for seen in tracker.track(frame):
         if seen.q is None:
             print(f"{frame.time_s:.3f} s  {seen.instrument}: {seen.status.value}")

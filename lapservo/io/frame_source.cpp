@@ -67,6 +67,7 @@ class PictureSource : public FrameSource {
                        fmt::format("{} as in {}: put the images of each encoding into a folder of its own",
                                    name_of(transfer_), files_.front().filename().string()));
     Frame frame{std::move(picture.bgr), static_cast<int>(next_), static_cast<double>(next_) / fps_, file, picture.flaw};
+    frame.is_srgb = is_srgb();
     ++next_;
     low_bits_ += picture.low_bits;
     return frame;

@@ -17,6 +17,9 @@ struct Frame {
   double time_s = 0;           ///< since the first frame
   std::filesystem::path file;  ///< the image's path; empty for videos and cameras
   std::optional<Status> flaw;  ///< why nothing is to be measured in it
+  /// Of a video or a stream: VideoReading::deinterlaced.
+  std::optional<bool> deinterlaced = {};
+  bool is_srgb = false;  ///< FrameSource::is_srgb()
 };
 
 /// Frames of an image, a folder of images (in the order of the numbers in their names), a video file, a stream

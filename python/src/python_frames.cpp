@@ -125,7 +125,11 @@ GivenFrames::GivenFrames(const py::object& given, double fps, const Camera* came
     owned = std::make_unique<IteratedFrames>(given, fps, of_one_recording);
   }
   source = owned ? owned.get() : given.cast<FrameSource*>();
-  if (camera) internal::expect_srgb(*source, name, camera->response);
+  // As the command line says it; of a FrameSource its owner knows.
+  const std::string remark = owned ? owned->remark() : "";
+  if (!remark.empty() && PyErr_WarnEx(PyExc_UserWarning, (name + ": " + remark).c_str(), 1) != 0)
+    throw py::error_already_set();
+  if (camera) internal::expect_srgb(source->is_srgb(), name, camera->response);
 }
 
 }  // namespace lapservo::python

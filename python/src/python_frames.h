@@ -23,8 +23,9 @@ bool is_path(const py::object& given);
 /// used without.
 struct GivenFrames {
   /// `fps` gives times to the images of a folder and to those without; `camera`, or null, and `deinterlace` say how a
-  /// path is read. Throws InputError as internal::open_camera_or_file() and internal::expect_srgb(). Refuses an
-  /// iterated frame whose time is not finite or, `of_one_recording`, does not rise.
+  /// path is read; what its FrameSource::remark() says is a warning. Throws InputError as
+  /// internal::open_camera_or_file() and internal::expect_srgb(). Refuses an iterated frame whose time is not finite
+  /// or, `of_one_recording`, does not rise.
   GivenFrames(const py::object& given, double fps, const Camera* camera, bool deinterlace,
               bool of_one_recording = true);
 

@@ -63,7 +63,7 @@ struct Members {
                     v.edges_raw_px, v.edges_covariance_px2, v.features, v.camera_from_unrolled, v.psi_rad, v.p_false,
                     v.refused, v.tip);
   }
-  static auto of(Frame& v) { return std::tie(v.bgr, v.index, v.time_s, v.file, v.flaw); }
+  static auto of(Frame& v) { return std::tie(v.bgr, v.index, v.time_s, v.file, v.flaw, v.deinterlaced, v.is_srgb); }
 };
 
 template <typename T>

@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "lapservo/calibration/recording/frame_recording.h"
 #include "lapservo/core/error.h"
 #include "lapservo/io/frame_source.h"
 #include "lapservo/io/image_file.h"
@@ -224,7 +225,7 @@ Method method_of(const std::string& word) {
 class SafeTracker {
  public:
   SafeTracker(std::shared_ptr<const Rig> rig, const TrackerOptions& options)
-      : rig_(std::move(rig)), tracker_(*rig_, options) {}
+      : rig_(std::move(rig)), deinterlace_(options.deinterlace || rig_->camera.deinterlace), tracker_(*rig_, options) {}
 
   std::vector<Observed> track(const Picture<"image">& image, const std::optional<Number<"stamp_s">>& stamp_s) {
     const py::gil_scoped_release others_run;
@@ -233,6 +234,7 @@ class SafeTracker {
     return observed(tracker_.track(image.bgr, at_s), rig_, at_s);
   }
   std::vector<Observed> track_frame(const Frame& frame) {
+    internal::check_frame_reading(frame, "frame", rig_->camera.response, deinterlace_);
     const py::gil_scoped_release others_run;
     const std::lock_guard lock(mutex_);
     return observed(frame.flaw ? tracker_.refuse(*frame.flaw) : tracker_.track(frame.bgr, frame.time_s), rig_,
@@ -253,6 +255,7 @@ class SafeTracker {
 
  private:
   std::shared_ptr<const Rig> rig_;
+  bool deinterlace_;
   std::mutex mutex_;
   Tracker tracker_;
 };
@@ -295,7 +298,8 @@ void bind_frames(py::module_& m) {
       py::arg("input"), py::arg("fps") = 30.0, py::arg("deinterlaced") = false, py::arg("colour_matrix") = "",
       py::arg("chroma_location") = "", py::arg("image_topic") = "",
       "An image, a folder of images (with `fps`), a video, a bag of ROS 1 or 2, 'rtsp://...', '/dev/video0' or "
-      "'gst:PIPELINE': a FrameSource. `deinterlaced`: one field of each frame is tracked. `colour_matrix` ('bt601', "
+      "'gst:PIPELINE': a FrameSource. `deinterlaced`: one field of each frame is "
+      "tracked, as the rig's camera or the tracker has deinterlace. `colour_matrix` ('bt601', "
       "'bt709', 'bt2020') and `chroma_location` ('left', 'centre', 'top-left') of a video, in place of its tags; "
       "`image_topic`: in a bag with several.");
   m.def(
@@ -342,7 +346,8 @@ Holds what it learnt from the frame before. Threads may share it; frames are the
            "images that don't follow one another need; max_p_false: an instrument is uncertain where a "
            "print that differs from the rig makes psi wrong with a higher probability.")
       .def("track", &SafeTracker::track_frame, py::arg("frame"),
-           "The same of a Frame; one that is flawed is refused, with its flaw for a status.")
+           "The same of a Frame; one that is flawed is refused, with its flaw for a status. InputError where the frame "
+           "was read otherwise than this rig and tracker have it: with deinterlaced or without, or light as sRGB.")
       .def("track", &SafeTracker::track, py::arg("image"), py::arg("stamp_s") = py::none(),
            R"(list[Observation], one per instrument, of uint8[H, W, 3] in blue green red, of the rig's size.
 

@@ -128,6 +128,12 @@ def test_each_recording_of_a_board_says_what_is_wrong_with_it(sample, tmp_path):
     cut.write_bytes(whole.read_bytes()[:whole.stat().st_size * 4 // 5])
     result = lapservo.calibrate_camera([cut, whole], "9x6", 0.005)
     assert result.complaint.startswith(f"{cut}: ends early") and str(whole) not in result.complaint
+    rig = lapservo.Rig.load(sample / "truth.yaml")
+    for read in (False, True):
+        frame = next(lapservo.open_frames(whole, deinterlaced=read))
+        assert lapservo.Tracker(rig, deinterlace=read).track(frame)
+        assert refused(lapservo.Tracker(rig, deinterlace=not read).track, frame).field == "deinterlaced"
+        assert refused(lapservo.calibrate_marker, [frame], rig, deinterlace=not read).field == "deinterlaced"
 
 
 def test_a_cameras_own_file_is_named_from_anywhere_and_never_written_over(recordings, swing, monkeypatch):
@@ -214,7 +220,12 @@ def test_pictures_in_another_light_are_refused_as_on_the_command_line(recordings
     camera = recordings.rig.camera
     rig = lapservo.Rig(lapservo.Camera(camera.width_px, camera.height_px, camera.matrix, response=1.7),
                        recordings.rig.instruments)
-    for frames in (folder, lapservo.open_frames(folder, fps=FPS)):
+    for frame in pickle.loads(pickle.dumps(list(lapservo.open_frames(folder, fps=FPS)))):
+        assert "is read as sRGB" in refused(lapservo.Tracker(rig).track, frame).problem
+        assert lapservo.Tracker(recordings.rig).track(frame)
+    with pytest.warns(UserWarning, match="names linear light: its light is read as sRGB"):
+        refused(lapservo.calibrate_colour, frame.file, recordings.rig)
+    for frames in (folder, lapservo.open_frames(folder, fps=FPS), list(lapservo.open_frames(folder, fps=FPS))):
         for calibrate in (lapservo.calibrate_colour, lapservo.calibrate_marker, lapservo.calibrate_registration):
             assert "is read as sRGB" in refused(calibrate, frames, rig, fps=FPS).problem
 

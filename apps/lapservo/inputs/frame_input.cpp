@@ -108,7 +108,7 @@ std::pair<std::unique_ptr<FrameSource>, std::string> open_whole(const std::strin
 std::unique_ptr<FrameSource> open_frames(const std::string& input, const FrameOptions& options, const Camera* camera) {
   auto [whole, layout] = open_whole(input, options, camera);
   auto source = of_one_eye(std::move(whole), input, options, layout);
-  if (camera) expect_srgb(*source, input, camera->response);
+  if (camera) expect_srgb(source->is_srgb(), input, camera->response);
   say_remark(input, source->remark());
   return source->kind() == FrameSource::Kind::live ? std::move(source) : read_ahead(std::move(source));
 }

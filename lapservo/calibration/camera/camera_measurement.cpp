@@ -80,6 +80,7 @@ void BoardRecordings::look_at(FrameSource& source, const std::string& name, cons
     if (!frame) break;
     if (!size_) size_ = frame->bgr.size(), whose_ = name_of(*frame);
     check_frame_size(*frame, name, *size_, whose_);
+    check_frame_reading(*frame, name, {}, field_.has_value());  // the response is measured
     if (read++ % every != 0) continue;
     if (frame->flaw) {
       ++read_.damaged;

@@ -9,6 +9,13 @@
 #include "lapservo/vision/image/interlacing.h"
 
 namespace lapservo::internal {
+namespace {
+
+std::string name_of(const Frame& frame, const std::string& recording) {
+  return frame.file.empty() ? recording : frame.file.string();
+}
+
+}  // namespace
 
 std::string text_of_damaged(int damaged, int frames) {
   return fmt::format("{} of {} frames are damaged: repair what carries them, or record them again", damaged, frames);
@@ -18,8 +25,8 @@ std::string FramesRead::remark_on_damaged() const {
   return damaged > 0 ? fmt::format(" ({} are damaged)", damaged) : "";
 }
 
-void expect_srgb(const FrameSource& source, const std::string& recording, const Response& response) {
-  if (!source.is_srgb() || response.kind == Response::Kind::srgb || response.sigma) return;
+void expect_srgb(bool is_srgb, const std::string& recording, const Response& response) {
+  if (!is_srgb || response.kind == Response::Kind::srgb || response.sigma) return;
   throw InputError(recording,
                    "names how it encodes light, which is read as sRGB, but the rig's response is another, "
                    "expected srgb, or one that calibrate camera measured with such images");
@@ -28,9 +35,18 @@ void expect_srgb(const FrameSource& source, const std::string& recording, const 
 void check_frame_size(const Frame& frame, const std::string& recording, const cv::Size& expected,
                       const std::string& whose) {
   if (frame.bgr.size() != expected)
-    throw InputError(frame.file.empty() ? recording : frame.file.string(), "size",
-                     fmt::format("{} x {}", frame.bgr.cols, frame.bgr.rows),
+    throw InputError(name_of(frame, recording), "size", fmt::format("{} x {}", frame.bgr.cols, frame.bgr.rows),
                      fmt::format("{} x {}, as {} has it", expected.width, expected.height, whose));
+}
+
+void check_frame_reading(const Frame& frame, const std::string& recording, const Response& response, bool deinterlace) {
+  const std::string name = name_of(frame, recording);
+  expect_srgb(frame.is_srgb, name, response);
+  if (frame.deinterlaced.value_or(deinterlace) == deinterlace) return;
+  throw InputError(name, "deinterlaced", fmt::format("{}", !deinterlace),
+                   deinterlace ? "true, as one field of each frame is tracked: open the video with deinterlaced=True"
+                               : "false, as whole frames are tracked: open the video without deinterlaced, or track "
+                                 "with deinterlace: true in the rig");
 }
 
 FramesRead read_frames(const FrameRecording& recording, const Rig& rig, int every, const JobWatch& watch,
@@ -44,6 +60,7 @@ FramesRead read_frames(const FrameRecording& recording, const Rig& rig, int ever
     const auto frame = source.next();
     if (!frame) break;
     check_frame_size(*frame, recording.name, {rig.camera.width_px, rig.camera.height_px}, "the rig's camera");
+    check_frame_reading(*frame, recording.name, rig.camera.response, deinterlace);
     if (read++ % every != 0) continue;
     if (frame->flaw) {
       ++frames.damaged;

@@ -55,14 +55,20 @@ struct FramesRead {
 
 /// Throws InputError, naming `recording`, where that says how it encodes light, which is undone, and the rig's response
 /// is neither sRGB nor measured with images that were read so.
-void expect_srgb(const FrameSource& source, const std::string& recording, const Response& response);
+void expect_srgb(bool is_srgb, const std::string& recording, const Response& response);
 
 /// Throws InputError, naming the frame's file or else `recording`, at a frame of another size than `whose`.
 void check_frame_size(const Frame& frame, const std::string& recording, const cv::Size& expected,
                       const std::string& whose);
 
+/// Throws InputError, naming the frame's file or else `recording`, at a frame that was read otherwise than it is
+/// tracked: as expect_srgb(), and at a video's that was not opened for `deinterlace`, which needs each field's own
+/// chroma.
+void check_frame_reading(const Frame& frame, const std::string& recording, const Response& response, bool deinterlace);
+
 /// Shows every `every`-th frame to `look`, as the tracker would see it, with its time; `look` may keep it, and returns
-/// a remark beside the progress. Throws InputError at a frame that is not of the rig's size, and where all are damaged.
+/// a remark beside the progress. Throws InputError at a frame that is not of the rig's size, as check_frame_reading(),
+/// and where all are damaged.
 FramesRead read_frames(const FrameRecording& recording, const Rig& rig, int every, const JobWatch& watch,
                        const std::function<std::string(const cv::Mat&, double)>& look);
 

@@ -1,6 +1,8 @@
 #include "lapservo/calibration/recording/frame_recording.h"
 
+#include <functional>
 #include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -25,37 +27,44 @@ TEST(FrameRecording, FramesThatWereShownStayAsTheyAre) {
     });
     ASSERT_EQ(shown.size(), 3U);
     for (std::size_t i = 0; i < shown.size(); ++i)
-      EXPECT_EQ(cv::mean(shown[i]),
-                cv::Scalar(10.0 + static_cast<double>(i), 10.0 + static_cast<double>(i), 10.0 + static_cast<double>(i)))
-          << deinterlace;
+      EXPECT_EQ(cv::mean(shown[i])[0], 10.0 + static_cast<double>(i)) << deinterlace;
   }
 }
 
-class DamagedSource : public EvenFrames {
- public:
-  DamagedSource(const cv::Size& size, std::vector<bool> damaged)
-      : EvenFrames(size, static_cast<int>(damaged.size())), damaged_(std::move(damaged)) {}
+struct ChangedFrames : EvenFrames {
+  ChangedFrames(const Camera& camera, int count, std::function<void(Frame&)> how)
+      : EvenFrames({camera.width_px, camera.height_px}, count), change(std::move(how)) {}
   std::optional<Frame> next() override {
     auto frame = EvenFrames::next();
-    if (frame && damaged_[static_cast<std::size_t>(frame->index)]) frame->flaw = Status::damaged;
+    if (frame) change(*frame);
     return frame;
   }
-
- private:
-  std::vector<bool> damaged_;
+  std::function<void(Frame&)> change;
 };
+
+std::string said_of(const Rig& rig, int count, bool deinterlace, const std::function<void(Frame&)>& change) {
+  ChangedFrames source(rig.camera, count, change);
+  const auto look = [](const cv::Mat&, double) { return ""; };
+  return testing::input_error([&] { read_frames({source, "frames", deinterlace}, rig, 1, {}, look); });
+}
 
 TEST(FrameRecording, OfDamagedFramesAloneIsRefused) {
   const Rig rig = scenes::usual_rig();
-  const auto said = [&](const std::vector<bool>& damaged) {
-    DamagedSource source({rig.camera.width_px, rig.camera.height_px}, damaged);
-    return testing::input_error([&] {
-      read_frames({source, "frames"}, rig, 1, {}, [](const cv::Mat&, double) { return ""; });
-    });
-  };
-  EXPECT_EQ(said(std::vector(4, true)),
+  const std::optional damaged = Status::damaged;
+  EXPECT_EQ(said_of(rig, 4, false, [&](Frame& f) { f.flaw = damaged; }),
             "frames: 4 of 4 frames are damaged: repair what carries them, or record them again");
-  EXPECT_EQ(said({true, false, true}), "");
+  EXPECT_EQ(said_of(rig, 3, false, [&](Frame& f) { f.flaw = f.index == 1 ? std::nullopt : damaged; }), "");
+}
+
+TEST(FrameRecording, FramesThatWereReadOtherwiseThanTheyAreTrackedAreRefused) {
+  Rig rig = scenes::usual_rig();
+  for (const bool read : {false, true})
+    for (const bool tracked : {false, true}) {
+      const std::string said = said_of(rig, 1, tracked, [read](Frame& f) { f.deinterlaced = read; });
+      EXPECT_EQ(said.substr(0, 25), read == tracked ? "" : "frames: deinterlaced: is ");
+    }
+  rig.camera.response = {.kind = Response::Kind::power, .gamma = 1.8};
+  EXPECT_NE(said_of(rig, 1, false, [](Frame& f) { f.is_srgb = true; }).find("is read as sRGB"), std::string::npos);
 }
 
 }  // namespace

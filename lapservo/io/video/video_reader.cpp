@@ -263,7 +263,8 @@ class Video : public FrameSource {
   }
   Frame counted(bool damaged, const cv::Mat& bgr) {
     damaged_ += damaged ? 1 : 0;
-    return {bgr, frames_++, time_s_.value_or(0), {}, damaged ? std::optional(Status::damaged) : std::nullopt};
+    const auto flaw = damaged ? std::optional(Status::damaged) : std::nullopt;
+    return {bgr, frames_++, time_s_.value_or(0), {}, flaw, fields_, is_srgb_};
   }
 
   // The first stamp is where times begin, be its frame lost. Frames that the container gives no time, or none later
