@@ -113,6 +113,12 @@ std::string YamlField::value_text() const {
   return node_->IsSequence() ? "a list of " + std::to_string(node_->size()) : "a map";
 }
 
+std::string YamlField::yaml_of(const std::string& key) const {
+  YAML::Emitter text;
+  text << YAML::BeginMap << YAML::Key << key << YAML::Value << *node_ << YAML::EndMap;
+  return text.c_str() + std::string("\n");
+}
+
 bool YamlField::present() const {
   return node_->IsDefined() && !node_->IsNull();
 }

@@ -36,6 +36,8 @@ class YamlField {
   [[noreturn]] void fail_within(const FieldProblem& problem) const;
   /// The value as complaints show it.
   std::string value_text() const;
+  /// The value as YAML under this key of a map: whole lines.
+  std::string yaml_of(const std::string& key) const;
 
   bool present() const;
   bool is_scalar() const;

@@ -21,23 +21,64 @@ namespace {
 constexpr auto file_kind = "camera file";
 constexpr std::string_view opencv_header = "%YAML:1.0";
 
+// Those that OpenCV's programs of calibration, today's and earlier ones, write beside a camera.
+constexpr std::initializer_list<const char*> opencv_keys{"calibration_time",
+                                                         "nframes",
+                                                         "nr_of_frames",
+                                                         "board_width",
+                                                         "board_height",
+                                                         "square_size",
+                                                         "marker_size",
+                                                         "aspectRatio",
+                                                         "fix_aspect_ratio",
+                                                         "flags",
+                                                         "avg_reprojection_error",
+                                                         "per_view_reprojection_errors",
+                                                         "extrinsic_parameters",
+                                                         "image_points",
+                                                         "grid_points",
+                                                         "calibration_Time",
+                                                         "nrOfFrames",
+                                                         "board_Width",
+                                                         "board_Height",
+                                                         "square_Size",
+                                                         "FixAspectRatio",
+                                                         "flagValue",
+                                                         "Avg_Reprojection_Error",
+                                                         "Per_View_Reprojection_Errors",
+                                                         "Extrinsic_Parameters",
+                                                         "Image_points"};
+
 // The texts of a rig's keys.
 struct CameraTexts {
-  std::string width, height, model = "plumb_bob";
+  std::string width, height, model;  // without a model: plumb_bob
   std::vector<std::string> matrix, distortion;
+  std::string others;  // lines of keys that are not the format's
 };
 
-// The fields of a file, and the names of missing ones.
+// The fields of a file, those that were read, and the names of missing ones.
 class Fields {
  public:
   Fields(YamlField map, std::string source, std::string format)
       : map_(std::move(map)), source_(std::move(source)), format_(std::move(format)) {}
 
   // The first of these keys that is there.
-  std::optional<YamlField> find(std::initializer_list<const char*> keys) const {
+  std::optional<YamlField> find(std::initializer_list<const char*> keys) {
     for (const char* key : keys)
-      if (const YamlField field = map_[key]; field.present()) return field;
+      if (const YamlField field = map_[key]; field.present()) {
+        read_.emplace_back(key);
+        return field;
+      }
     return std::nullopt;
+  }
+  // The lines of all keys but those read and `unused`, which the format has beside them.
+  std::string others(std::initializer_list<const char*> unused) const {
+    std::string lines;
+    for (const auto& [key, value] : map_.entries("a map"))
+      if (std::find(unused.begin(), unused.end(), key) == unused.end() &&
+          std::find(read_.begin(), read_.end(), key) == read_.end())
+        lines += value.yaml_of(key);
+    return lines;
   }
   std::string text(std::initializer_list<const char*> keys) {
     const auto field = find(keys);
@@ -70,7 +111,7 @@ class Fields {
  private:
   YamlField map_;
   std::string source_, format_;
-  std::vector<std::string> missing_;
+  std::vector<std::string> read_, missing_;
 };
 
 bool is_zero(const std::string& number) {
@@ -86,6 +127,7 @@ CameraTexts read_opencv(Fields fields) {
   camera.matrix = fields.texts({"camera_matrix", "Camera_Matrix", "cameraMatrix", "K"});
   camera.distortion = fields.texts({"distortion_coefficients", "Distortion_Coefficients", "distCoeffs", "D"});
   fields.refuse_missing();
+  camera.others = fields.others(opencv_keys);
   return camera;
 }
 
@@ -100,6 +142,7 @@ CameraTexts read_camera_info(Fields fields) {
     fields.refuse("of a camera that is not calibrated (K is zero)");
   if (const auto model = fields.find({"distortion_model"}); model && model->value_text() != "''")
     camera.model = model->text("a distortion model");
+  camera.others = fields.others({"R", "P", "r", "p"});
   return camera;
 }
 
@@ -116,15 +159,17 @@ CameraTexts read_kalibr(Fields fields) {
   if (size.size() != 2 || k.size() != 4) fields.refuse("without two numbers of resolution and four of intrinsics");
   camera.width = size[0], camera.height = size[1];
   camera.matrix = {k[0], "0", k[2], "0", k[1], k[3], "0", "0", "1"};
+  camera.others = fields.others({"cam_overlaps", "rostopic", "T_cam_imu", "timeshift_cam_imu", "T_cn_cnm1"});
   return camera;
 }
 
 std::string yaml_of(const CameraTexts& camera) {
   const auto& d = camera.distortion;
   return fmt::format(
-      "image_width: {}\nimage_height: {}\ndistortion_model: {}\ncamera_matrix: {{rows: 3, cols: 3, data: [{}]}}\n"
-      "distortion_coefficients: {{rows: 1, cols: {}, data: [{}]}}\n",
-      camera.width, camera.height, camera.model, fmt::join(camera.matrix, ", "), d.size(), fmt::join(d, ", "));
+      "image_width: {}\nimage_height: {}\ncamera_matrix: {{rows: 3, cols: 3, data: [{}]}}\n"
+      "distortion_coefficients: {{rows: 1, cols: {}, data: [{}]}}\n{}{}",
+      camera.width, camera.height, fmt::join(camera.matrix, ", "), d.size(), fmt::join(d, ", "),
+      camera.model.empty() ? "" : "distortion_model: " + camera.model + "\n", camera.others);
 }
 
 // Without OpenCV's header, which YAML has as "%YAML 1.0", and without the documents after the first, as of
@@ -147,7 +192,9 @@ std::string with_rig_keys(const std::string& text, const std::string& source) {
     return yaml_of(read_camera_info({root, source, "a CameraInfo message"}));
   if (root["cam1"].present())
     throw InputError(source, "is a Kalibr camchain of several cameras, expected one: keep the rig's as cam0");
-  if (root["cam0"].present()) return yaml_of(read_kalibr({root["cam0"], source, "a Kalibr camchain"}));
+  if (root["cam0"].present())
+    return yaml_of(read_kalibr({root["cam0"], source, "a Kalibr camchain"})) +
+           Fields(root, source, "").others({"cam0"});
   return text;
 }
 

@@ -1,6 +1,7 @@
 #include "lapservo/rig/camera_formats.h"
 
 #include <string>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -23,19 +24,12 @@ camera_matrix: !!opencv-matrix
    cols: 3
    dt: d
    data: [ 500., 0., 320.5, 0., 510., 240.25, 0., 0., 1. ]
-distortion_coefficients: !!opencv-matrix
-   rows: 5
-   cols: 1
-   dt: d
-   data: [ -1.5e-01, 0.02, 0.001, -0.002, 0. ]
+distortion_coefficients: !!opencv-matrix { rows: 5, cols: 1, dt: d, data: [ -1.5e-01, 0.02, 0.001, -0.002, 0. ] }
 avg_reprojection_error: 0.2
 )";
 
 constexpr auto ros1 = R"(header: 
   seq: 12
-  stamp: 
-    secs: 3
-    nsecs: 5
   frame_id: "endoscope"
 height: 480
 width: 640
@@ -53,9 +47,6 @@ header:
 )";
 
 constexpr auto ros2 = R"(header:
-  stamp:
-    sec: 3
-    nanosec: 5
   frame_id: endoscope
 height: 480
 width: 640
@@ -78,10 +69,7 @@ constexpr auto kalibr = R"(cam0:
 constexpr auto rig = R"(camera: camera.yaml
 instruments:
   - name: PSM1
-    marker:
-      diameter_m: 0.0084
-      bands_upper_m: [0.0035, 0.0035, 0.017]
-      bands_lower_m: [0.0095, 0.0095, 0.005]
+    marker: {diameter_m: 0.0084, bands_upper_m: [0.0035, 0.0035, 0.017], bands_lower_m: [0.0095, 0.0095, 0.005]}
 )";
 
 Camera camera_of(const std::string& text) {
@@ -94,20 +82,32 @@ std::string replaced(std::string text, const std::string& part, const std::strin
   return text.replace(text.find(part), part.size(), by);
 }
 
-TEST(CameraFormats, OfOtherProgramsGiveTheSameCamera) {
+void expect_refused(const std::string& text, const std::string& why) {
+  EXPECT_TRUE(testing::has(testing::input_error([&] { camera_of(text); }), why));
+}
+
+TEST(CameraFormats, OfOtherProgramsGiveTheSameCameraAndOurOwnStayAsTheyAre) {
+  const std::string own = "image_width: 640\nimage_height: 480\n";
+  EXPECT_EQ(with_rig_keys(own, "camera.yaml"), own);
   for (const char* text : {opencv, ros1, ros2, kalibr}) {
     const Camera expected{640, 480, 500, 510, 320.5, 240.25, {-0.15, 0.02, 0.001, -0.002, 0}, {}};
     EXPECT_EQ(camera_of(text), expected) << text;
   }
 }
 
-TEST(CameraFormats, OfOurOwnStayAsTheyAre) {
-  const std::string own = "image_width: 640\nimage_height: 480\n";
-  EXPECT_EQ(with_rig_keys(own, "camera.yaml"), own);
-}
-
-void expect_refused(const std::string& text, const std::string& why) {
-  EXPECT_TRUE(testing::has(testing::input_error([&] { camera_of(text); }), why));
+TEST(CameraFormats, OfOtherProgramsMayHaveTheKeysOfOurOwnAndNoUnknownOnes) {
+  for (const auto& [text, line] : {std::pair{opencv, "image_height: 480"},
+                                   {ros1, "height: 480"},
+                                   {ros2, "height: 480"},
+                                   {kalibr, "cam0:"},
+                                   {kalibr, "  resolution: [640, 480]"}}) {
+    const std::string file = text, place = line, indent = place.substr(0, place.find_first_not_of(' '));
+    const auto with = [&](const std::string& key) { return replaced(file, place, indent + key + "\n" + place); };
+    EXPECT_EQ(camera_of(with("response: {light: [0, 0.2, 1], value: [0, 0.5, 1]}")).response.table_light.size(), 3U);
+    expect_refused(with("respons: linear"), "respons: is unknown, expected a known key, of which response is");
+    expect_refused(with("binning_x: 2"), "binning_x");
+    expect_refused(with("roi: {x_offset: 100}"), "roi.x_offset: is 100, expected 0: a camera_matrix of the pixels");
+  }
 }
 
 TEST(CameraFormats, ThatLackNumbersOrHoldSeveralCamerasAreRefused) {
