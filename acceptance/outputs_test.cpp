@@ -136,6 +136,8 @@ TEST_F(Outputs, NeverGoOverInputs) {
     expect_refused(std::string("calibrate ") + step + " --rig rig.yaml --out cam.yaml", {"a whole rig would replace"});
   expect_refused("marker design --diameter-mm 8.4 --distance-mm 100 --out rig.yaml", {"is a rig", "marker"});
   EXPECT_EQ(snapshot(), before);
+  fs::remove("frames/0000.rig.yaml"), fs::create_symlink("gone.yaml", "frames/0000.rig.yaml");
+  expect_refused("track frames --out new.csv", {"frames/0000.rig.yaml: is a link to no file"});
 }
 
 TEST_F(Outputs, FoldersOfARunAreReplacedOnlyWhenAsked) {

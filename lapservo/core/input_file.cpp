@@ -26,7 +26,9 @@ std::string read_input(const std::filesystem::path& path, std::size_t max_bytes,
   // Not blocking: to open a pipe that nobody writes would take for ever.
   const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC));
   struct stat about {};
-  if (!file.is_open() || ::fstat(file.number(), &about) != 0) fail("can't be opened");
+  std::error_code error;
+  if (!file.is_open() || ::fstat(file.number(), &about) != 0)
+    fail(errno == ENOENT && std::filesystem::is_symlink(path, error) ? "is a link to no file" : "can't be opened");
   if (S_ISDIR(about.st_mode)) fail("is a folder");
   if (S_ISREG(about.st_mode) && static_cast<std::size_t>(about.st_size) > max_bytes) fail_too_large();
 

@@ -100,6 +100,9 @@ Pictures pictures_in(const fs::path& folder) {
   if (error) throw InputError(folder.string(), "can't be read (" + error.message() + "), expected a folder of images");
   for (const auto& entry : entries) {
     const bool hidden = entry.path().filename().string().starts_with(".");
+    if (!hidden && has_image_extension(entry.path()) && entry.is_symlink(error) && !entry.exists(error))
+      throw InputError(entry.path().string(),
+                       "is a link to no file, expected an image: fetch what it names, or remove the link");
     if (hidden || !entry.is_regular_file(error)) continue;
     if (has_image_extension(entry.path())) files.push_back(entry.path());
     unread += has_unread_extension(entry.path());

@@ -163,9 +163,8 @@ class RigByFrame {
       fs::path at = frame.file.empty() ? fs::path(options_.input) : frame.file;
       if (!at.has_filename()) at = at.parent_path();  // a folder's name may end in /
       const fs::path own = sidecar(at), shared = at.parent_path() / "rig.yaml";
-      std::error_code error;
-      const fs::path chosen = fs::exists(own, error) ? own : shared;
-      if (!fs::exists(chosen, error))
+      const fs::path chosen = is_there(own) ? own : shared;
+      if (!is_there(chosen))
         throw InputError(at.string(),
                          "has no rig beside it (" + own.filename().string() + " or rig.yaml): name one with --rig");
       if (chosen != path_) use(chosen);
@@ -193,6 +192,11 @@ class RigByFrame {
   bool has_other_rig(const fs::path& picture) const {
     std::error_code error;
     return fs::exists(sidecar(picture), error) && !fs::equivalent(sidecar(picture), options_.rig, error);
+  }
+  // A link to no file, too: load_rig() names it.
+  static bool is_there(const fs::path& rig) {
+    std::error_code error;
+    return fs::exists(fs::symlink_status(rig, error));
   }
   static fs::path sidecar(const fs::path& file) { return fs::path(file).replace_extension(".rig.yaml"); }
   void use(const fs::path& path) {
