@@ -220,6 +220,14 @@ std::vector<Mistake> mistakes() {
        {check},
        {"the endoscope or the arm's base was moved", "calibrate registration"}},
       {"squares for inner corners", [] {}, {changed(camera, {{"9x6", "10x7"}})}, {"number of inner corners"}},
+      {"rig edited meanwhile",
+       [] {
+         in_rig({})();  // the pipe is written when the rig is read
+         const char* pipe = "mkfifo late.csv; (echo '# mine' >>rig.yaml; cat swing_joints.csv) >late.csv &";
+         EXPECT_EQ(std::system(pipe), 0);
+       },
+       {"calibrate registration swing --fps 8 --joints late.csv --rig rig.yaml --out ./rig.yaml"},
+       {"rig.yaml: was changed while this ran", "repeat the command"}},
       {"a turn for the swing",
        [] {},
        {"calibrate registration turn --fps 8 --joints turn_joints.csv --rig rig.yaml --out out.yaml"},

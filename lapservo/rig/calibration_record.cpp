@@ -68,6 +68,8 @@ void write_record(const fs::path& path, const CalibrationRecord& record) {
 }
 
 std::string content_state(const fs::path& path) {
+  std::error_code error;
+  if (!fs::is_regular_file(path, error)) return {};
   std::ifstream file(path, std::ios::binary);
   if (!file) return {};
   std::uint64_t hash = 14695981039346656037U;

@@ -41,7 +41,8 @@ CalibrationRecord read_record(const std::filesystem::path& path);
 /// Appears whole or not at all. Throws InputError when it can't be written.
 void write_record(const std::filesystem::path& path, const CalibrationRecord& record);
 
-/// A fingerprint of a file's bytes (FNV-1a), to find out whether it has changed. Empty when it can't be read.
+/// A fingerprint of a file's bytes (FNV-1a), to find out whether it has changed. Empty for a pipe, whose
+/// bytes are gone when they are read, and when it can't be read.
 std::string content_state(const std::filesystem::path& path);
 
 /// The same of a rig's file, and of the camera's and tools' files that it names. Throws as load_rig().

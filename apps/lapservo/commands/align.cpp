@@ -61,6 +61,7 @@ void write_page(const std::string& path, const std::string& input, const Alignme
 }
 
 int run(const CalibrateOptions& options) {
+  const RigAsRead read(options.rig);
   Rig rig = load_rig(options.rig);
   const std::size_t index = instrument_meant(rig, options.instrument, options.rig);
   Instrument instrument = rig.instruments[index];
@@ -88,7 +89,7 @@ int run(const CalibrateOptions& options) {
   }
   rig.instruments[index].image_delay_s = found.delay_s;
   rig.instruments[index].sigma_image_delay_s = rounded_sigma(found.sigma_delay_s);
-  return write_rig(*out, rig, options.out);
+  return write_rig(*out, rig, options.out, read);
 }
 
 }  // namespace

@@ -73,9 +73,11 @@ void print_result(const std::vector<BoardView>& views, const CameraCalibration& 
                 response.sharpening, response.sharpening_px);
 }
 
-void write_results(const CalibrateCameraOptions& options, std::optional<Rig> rig, const Camera& camera) {
+void write_results(const CalibrateCameraOptions& options, std::optional<Rig> rig, const RigAsRead& read,
+                   const Camera& camera) {
   std::string rig_text;
   if (rig) {
+    read.expect_unchanged(options.rig_out());
     rig->camera = camera, rig->camera_file.clear();
     rig_text = measured_rig_yaml(*rig, options.rig_out());
   }
@@ -93,6 +95,7 @@ void write_results(const CalibrateCameraOptions& options, std::optional<Rig> rig
 
 int calibrate_camera(const CalibrateCameraOptions& options) {
   const Board board = board_of(options.board);
+  const RigAsRead read(options.rig);
   std::optional<Rig> rig;
   if (!options.rig.empty()) rig = load_rig(options.rig);
   check_files(options, rig);
@@ -111,7 +114,7 @@ int calibrate_camera(const CalibrateCameraOptions& options) {
   for (const std::string& name : without_board) std::printf("left out, there is no board: %s\n", name.c_str());
   print_result(views, calibration);
   if (!more.empty()) std::printf("better still: %s\n", more.c_str());
-  write_results(options, rig, measured_camera(calibration));
+  write_results(options, rig, read, measured_camera(calibration));
   if (rig && std::any_of(rig->instruments.begin(), rig->instruments.end(),
                          [](const Instrument& instrument) { return instrument.camera_from_rcm.has_value(); }))
     std::printf("camera_from_rcm is as it was: where it was measured with another camera, measure it again\n");

@@ -25,6 +25,7 @@ void print(const Instrument& instrument, const ColourCalibration& calibration, s
 }  // namespace
 
 int calibrate_colour(const CalibrateOptions& options) {
+  const RigAsRead read(options.rig);
   const Rig rig = load_rig(options.rig);
   const std::size_t index = instrument_meant(rig, options.instrument, options.rig);
   const Instrument& instrument = rig.instruments[index];
@@ -39,7 +40,7 @@ int calibrate_colour(const CalibrateOptions& options) {
   if (!measured.read.stopped) say_complaint(options.input, measured.read.complaint);
   if (!calibration.refusal.empty()) return refuse_calibration(options, calibration.refusal);
   print(instrument, calibration, measured.frames);
-  return write_rig(out, with_colour(rig, index, calibration), options.out);
+  return write_rig(out, with_colour(rig, index, calibration), options.out, read);
 }
 
 void add_calibrate_colour(Command parent) {

@@ -1,8 +1,10 @@
 #include "apps/lapservo/commands/calibrate/calibrate_inputs.h"
 
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <optional>
+#include <system_error>
 #include <vector>
 
 #include "apps/lapservo/cli/interrupt.h"
@@ -10,6 +12,7 @@
 #include "apps/lapservo/inputs/frame_input.h"
 #include "apps/lapservo/inputs/input_files.h"
 #include "lapservo/core/error.h"
+#include "lapservo/rig/calibration_record.h"
 #include "lapservo/rig/instruments.h"
 #include "lapservo/rig/rig_writer.h"
 
@@ -88,7 +91,16 @@ JobWatch watched_job() {
           }};
 }
 
-int write_rig(AtomicFile& out, const Rig& rig, const std::string& path) {
+RigAsRead::RigAsRead(const std::string& rig) : rig_(rig), content_(content_state(rig)) {}
+
+void RigAsRead::expect_unchanged(const std::string& out) const {
+  std::error_code error;
+  if (std::filesystem::equivalent(rig_, out, error) && content_state(rig_) != content_)
+    throw InputError(out, "was changed while this ran, and is left as it is: repeat the command");
+}
+
+int write_rig(AtomicFile& out, const Rig& rig, const std::string& path, const RigAsRead& read) {
+  read.expect_unchanged(path);
   out.stream() << measured_rig_yaml(rig, path);
   out.commit();
   std::printf("rig: %s\n", path.c_str());

@@ -59,8 +59,20 @@ void print_faults(const std::vector<std::string>& faults);
 /// Ends a job at Ctrl-C and shows its progress (progress.h), until it is destroyed.
 internal::JobWatch watched_job();
 
-/// Writes the rig with what was measured, and says where it is; returns the exit code.
-int write_rig(internal::AtomicFile& out, const Rig& rig, const std::string& path);
+/// The rig's file as a calibration reads it: its content_state(), made before load_rig().
+class RigAsRead {
+ public:
+  explicit RigAsRead(const std::string& rig);
+  /// Throws InputError where `out` is that file and has another content by now, which would be lost.
+  void expect_unchanged(const std::string& out) const;
+
+ private:
+  std::string rig_, content_;
+};
+
+/// Writes the rig with what was measured, and says where it is; returns the exit code. Throws InputError as
+/// RigAsRead::expect_unchanged().
+int write_rig(internal::AtomicFile& out, const Rig& rig, const std::string& path, const RigAsRead& read);
 
 /// Says on stderr why there is no result; returns the exit code.
 int refuse(const std::string& source, const std::string& why);

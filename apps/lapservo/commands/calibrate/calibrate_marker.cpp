@@ -50,6 +50,7 @@ void print_scale(const Marker& before, const Marker& after) {
 }  // namespace
 
 int calibrate_marker(const CalibrateOptions& options) {
+  const RigAsRead read(options.rig);
   Rig rig = load_rig(options.rig);
   const std::size_t index = instrument_meant(rig, options.instrument, options.rig);
   const Instrument& instrument = rig.instruments[index];
@@ -81,7 +82,7 @@ int calibrate_marker(const CalibrateOptions& options) {
         "seam a little behind, psi is some mrad off; turn the instrument there and back\n");
   if (!joints) std::printf("seam_rad is the rig's: where the seam lies on the instrument takes --joints\n");
   rig.instruments[index].marker = calibration.marker;
-  return write_rig(out, rig, options.out);
+  return write_rig(out, rig, options.out, read);
 }
 
 void add_calibrate_marker(Command parent) {

@@ -170,6 +170,7 @@ void print_reach(const Marker& marker, const Registration& registration) {
 }  // namespace
 
 int calibrate_registration(const CalibrateOptions& options) {
+  const RigAsRead read(options.rig);
   Rig rig = load_rig(options.rig);
   const std::size_t index = instrument_meant(rig, options.instrument, options.rig);
   Instrument instrument = rig.instruments[index];
@@ -196,7 +197,7 @@ int calibrate_registration(const CalibrateOptions& options) {
   print_faults(registration.faults);
   for (const std::string& what : registration.unknown) std::printf("%s\n", what.c_str());
   rig.instruments[index] = registered(rig.instruments[index], registration);
-  write_rig(out, rig, options.out);
+  write_rig(out, rig, options.out, read);
   if (registration.arm) dvrk.write(rig.instruments[index], registration.arm->ranges, options.out);
   return 0;
 }

@@ -112,6 +112,7 @@ int calibrate_tip(CalibrateTipOptions options, const Command& command) {
     command.refuse(frame_option_names(), "is of images, expected --pivot or --touch with it");
   if (options.pivot.empty()) command.refuse({"--joint-topic"}, "is of a bag, expected --pivot with it");
   options.input = options.pivot + options.touches;  // the one that is given
+  const RigAsRead read(options.rig);
   Rig rig = load_rig(options.rig);
   const std::size_t index = instrument_meant(rig, options.instrument, options.rig);
   refuse_outputs_over_inputs(options, rig);
@@ -125,7 +126,7 @@ int calibrate_tip(CalibrateTipOptions options, const Command& command) {
   print(calibration);
   Tool& measured = rig.instruments[index].tool.emplace(calibration.tool);
   measured.place->covariance = rounded_covariance(measured.place->covariance);
-  return write_rig(out, rig, options.out);
+  return write_rig(out, rig, options.out, read);
 }
 
 }  // namespace
