@@ -572,6 +572,10 @@ TEST_F(CommandLine, CalibrateRegistrationWritesWhereTheArmStands) {
   const std::string written = read_file("out/rig.yaml");
   expect_failed("calibrate marker in/few --rig " + unregistered + " --out out/rig.yaml", {"film a slow full turn"});
   EXPECT_EQ(read_file("out/rig.yaml"), written);
+  ToolTest::expect_refused(
+      replaced(calibrate, "out/rig", "out/psm") + " --joints in/joints.csv --base-frame out/b.json",
+      {"out/psm.yaml: joints.sign: is [1, -1, 1, -1]"});
+  EXPECT_FALSE(fs::exists("out/psm.yaml"));
 
   // How well the tip is known, and by which part least, with readings of a wrist.
   const std::string with_tool = in("tool.yaml", read_file("out/rig.yaml") +

@@ -58,7 +58,8 @@ void refuse_idle(const DvrkOptions& options, const Command& command) {
     command.refuse({"--reference-frame"}, "is not in an entry of suj-fixed.json, expected none with --endoscope");
 }
 
-// Before the job: throws InputError for what can't be done, and reads where the ECM stands. Then write().
+// Before the job: throws InputError for what can't be done, and reads where the ECM stands. Then find(), before the rig
+// is written, and write().
 class DvrkOutput {
  public:
   // `has_joints`: whether the recording has them.
@@ -88,42 +89,54 @@ class DvrkOutput {
     endoscope_ = pose.newest();
   }
 
-  // `ranges`: of the joints' readings. Throws InputError as dvrk_base(), naming `source`.
-  void write(const Instrument& instrument, const JointRanges& ranges, const std::string& source) {
+  // `ranges`: of the joints' readings. Throws InputError as dvrk_base(), naming `source`, and where nobody reads the
+  // topic of --set-base-frame.
+  void find(const Instrument& instrument, const JointRanges& ranges, const std::string& source) {
     if (!file_ && options_.set_base_frame.empty()) return;
-    const DvrkBase base = dvrk_base(instrument, ranges, source);
-    std::printf("dVRK's kinematics put the shaft within %.2f mrad of this registration%s\n", 1e3 * base.worst_axis_rad,
-                base.worst_axis_rad > 2e-3 ? ": the encoder of pitch is off, see joints.offset" : "");
+    base_ = dvrk_base(instrument, ranges, source);
+    if (options_.set_base_frame.empty()) return;
+    const Address arm = address_of(options_.set_base_frame, "--set-base-frame");
+    transport_ = &transports_.get(arm.transport, "--set-base-frame");
+    topic_ = topic_of(arm.name, "set_base_frame");
+    say_ = transport_->publisher<PlaceMessage>(topic_);
+    if (!wait_until([&] { return !transport_->readers(topic_).empty(); }, wait_s))
+      throw InputError("--set-base-frame", fmt::format("{} has no reader within {:.0f} s", topic_, wait_s));
+  }
+
+  // The base frame that find() found.
+  void write(const std::string& instrument) {
+    if (!base_) return;
+    std::printf("dVRK's kinematics put the shaft within %.2f mrad of this registration%s\n",
+                1e3 * base_->worst_axis_rad,
+                base_->worst_axis_rad > 2e-3 ? ": the encoder of pitch is off, see joints.offset" : "");
     if (file_) {
-      file_->stream() << (endoscope_ ? dvrk_suj_fixed_json(base.camera_from_base, instrument.name, *endoscope_)
-                                     : dvrk_base_frame_json(base.camera_from_base, options_.reference_frame));
+      file_->stream() << (endoscope_ ? dvrk_suj_fixed_json(base_->camera_from_base, instrument, *endoscope_)
+                                     : dvrk_base_frame_json(base_->camera_from_base, options_.reference_frame));
       file_->commit();
       std::printf("base frame: %s\n", options_.base_frame.c_str());
     }
-    if (!options_.set_base_frame.empty()) publish(base.camera_from_base);
+    if (transport_) publish(base_->camera_from_base);
   }
 
  private:
   void publish(const Rigid3& camera_from_base) {
-    const Address arm = address_of(options_.set_base_frame, "--set-base-frame");
-    Transport& transport = transports_.get(arm.transport, "--set-base-frame");
-    const std::string topic = topic_of(arm.name, "set_base_frame");
-    const auto say = transport.publisher<PlaceMessage>(topic);
-    if (!wait_until([&] { return !transport.readers(topic).empty(); }, wait_s))
-      throw InputError("--set-base-frame", fmt::format("{} has no reader within {:.0f} s", topic, wait_s));
     // Again and again: a reader that is known here may not know this writer yet.
     constexpr int times = 10;
     for (int i = 0; i < times; ++i) {
-      say({transport.stamp_now_s(), options_.reference_frame, dvrk_from_camera() * camera_from_base});
+      say_({transport_->stamp_now_s(), options_.reference_frame, dvrk_from_camera() * camera_from_base});
       std::this_thread::sleep_for(std::chrono::milliseconds(100));
     }
-    std::printf("base frame: published on %s\n", topic.c_str());
+    std::printf("base frame: published on %s\n", topic_.c_str());
   }
 
   const DvrkOptions& options_;
   Transports transports_{"lapservo_calibrate"};
   std::optional<AtomicFile> file_;
   std::optional<Rigid3> endoscope_;
+  std::optional<DvrkBase> base_;
+  Transport* transport_ = nullptr;  // of --set-base-frame
+  std::string topic_;
+  Transport::Publisher<PlaceMessage> say_;
 };
 
 void print_numbers(const Instrument& before, const Registration& registration) {
@@ -197,8 +210,9 @@ int calibrate_registration(const CalibrateOptions& options) {
   print_faults(registration.faults);
   for (const std::string& what : registration.unknown) std::printf("%s\n", what.c_str());
   rig.instruments[index] = registered(rig.instruments[index], registration);
+  if (registration.arm) dvrk.find(rig.instruments[index], registration.arm->ranges, options.out);
   write_rig(out, rig, options.out, read);
-  if (registration.arm) dvrk.write(rig.instruments[index], registration.arm->ranges, options.out);
+  dvrk.write(instrument.name);
   return 0;
 }
 
