@@ -483,6 +483,13 @@ TEST_P(FirstWireLoop, RecordsAnArmThatItMovesAndCalibratesFromIt) {
   const Rigid3 moved = rig_.instruments[0].camera_from_rcm->inverse() * *measured.camera_from_rcm;
   EXPECT_LT(moved.translation.norm(), 0.5e-3) << said("tool.txt");
 
+  // It is no recording of another arm.
+  std::filesystem::create_directory(file("new.yaml.recordings"));
+  std::filesystem::create_directory_symlink(file("swing"), file("new.yaml.recordings") + "/turn");
+  expect_ends(fmt::format("calibrate all --rig {0} --camera {1}:/endoscope/image_raw --robot {1}:PSM2",
+                          file("new.yaml"), GetParam()),
+              2, "holds /PSM1/measured_js, expected /PSM2/measured_js of --robot: rename");
+
   // The same for dVRK: published for a resting endoscope, and as a file for one that an ECM holds.
   std::optional<PlaceMessage> base_frame;
   std::mutex mutex;

@@ -51,8 +51,8 @@ class Recording {
     if (!options.robot.empty()) subscribe_joints(transports, address_of(options.robot, "--robot"));
     const cv::Size size = rig ? cv::Size(rig->camera.width_px, rig->camera.height_px) : cv::Size();
     input_ = open_images(options.camera, "--camera", size, transports,
-                         names_topic(options.camera) ? sink_of_topic(address_of(options.camera, "--camera").name)
-                                                     : sink_of_camera(clock));
+                         names_topic(options.camera) ? sink_of_topic(recorded_topic(options.camera))
+                                                     : sink_of_camera(recorded_topic(options.camera), clock));
   }
 
   RecordedCounts counts() const { return recorder_.counts(); }
@@ -83,11 +83,11 @@ class Recording {
             [this, topic](CompressedImageMessage&& message) { add(topic, std::move(message)); }};
   }
   // Stamps of this computer's cameras are on the monotonic clock, or missing; joints' are on that of 1970.
-  ImageSink sink_of_camera(const Clock& clock) {
-    return {[this, &clock](ImageMessage&& message) {
+  ImageSink sink_of_camera(const std::string& topic, const Clock& clock) {
+    return {[this, topic, &clock](ImageMessage&& message) {
               const double age_s = std::isfinite(message.stamp_s) ? clock.now_s() - message.stamp_s : 0;
               message.stamp_s = since_1970_s() - age_s;
-              add("/camera/image_raw", std::move(message));
+              add(topic, std::move(message));
             },
             {}};
   }

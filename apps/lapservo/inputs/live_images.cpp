@@ -40,6 +40,10 @@ bool names_topic(const std::string& text) {
   return text.starts_with("ros1:") || text.starts_with("ros2:");
 }
 
+std::string recorded_topic(const std::string& camera) {
+  return names_topic(camera) ? address_of(camera, "--camera").name : "/camera/image_raw";
+}
+
 ImageInput open_images(const std::string& text, const std::string& option, const cv::Size& size, Transports& transports,
                        ImageSink sink) {
   if (names_topic(text)) {

@@ -31,6 +31,8 @@ class Transports {
 
 /// Whether a text names a topic, ros2:/topic or ros1:/topic, whose stamps are the sender's.
 bool names_topic(const std::string& text);
+/// The topic of the images of --camera in a recording: that itself, or one for cameras of this computer.
+std::string recorded_topic(const std::string& camera);
 
 /// Where images go, in another thread, one at a time.
 struct ImageSink {

@@ -19,7 +19,10 @@
 #include "apps/lapservo/commands/calibrate/calibrate_inputs.h"
 #include "apps/lapservo/inputs/input_files.h"
 #include "apps/lapservo/inputs/joint_input.h"
+#include "apps/lapservo/inputs/live_images.h"
+#include "apps/lapservo/inputs/transports.h"
 #include "lapservo/core/error.h"
+#include "lapservo/crtk/crtk_robot.h"
 #include "lapservo/rig/calibration_record.h"
 #include "lapservo/rig/rig.h"
 #ifdef LAPSERVO_BAGS
@@ -261,10 +264,33 @@ class Guide {
 };
 
 #ifdef LAPSERVO_BAGS
+// Throws InputError where this recording has the images of another camera or the joints of another arm.
+void expect_recording_of(const AllOptions& options, const fs::path& folder, const std::string& name) {
+  const auto bag = open_bag(folder.string());
+  const auto expect = [&](const std::string& option, std::string topic, bool of_joints) {
+    if (!topic.starts_with('/')) topic.insert(0, "/");
+    std::string others;
+    for (const BagTopic& held : bag->topics()) {
+      if ((held.type == joint_type) != of_joints) continue;
+      if (held.name == topic || "/" + held.name == topic) return;
+      others += (others.empty() ? "" : ", ") + held.name;
+    }
+    if (!others.empty())
+      throw InputError(folder.string(),
+                       fmt::format("holds {}, expected {} of {}: rename {} to have it recorded anew, or name a "
+                                   "recording with --{}",
+                                   others, topic, option, folder.parent_path().string(), name));
+  };
+  expect("--camera", recorded_topic(options.camera), false);
+  if (!options.robot.empty())
+    expect("--robot", topic_of(address_of(options.robot, "--robot").name, "measured_js"), true);
+}
+
 // The recording of this name beside the rig, made now where it isn't there. Empty: it could not be made.
 std::string recorded(const AllOptions& options, const std::string& name, const char* what) {
   const fs::path folder = fs::path(options.rig + ".recordings") / name;
   if (fs::exists(folder / "metadata.yaml")) {
+    expect_recording_of(options, folder, name);
     std::printf("%s: as recorded in %s\n", name.c_str(), folder.c_str());
     return folder.string();
   }
