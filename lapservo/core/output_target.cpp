@@ -31,9 +31,13 @@ int own_descriptor_of(const struct stat& status) {
 }
 
 // The owner only where we may.
-void keep_owner_and_mode(const OutputTarget& target, int descriptor) {
+bool keep_owner_and_mode(const OutputTarget& target, int descriptor) {
   [[maybe_unused]] const int refused = ::fchown(descriptor, target.existing->st_uid, target.existing->st_gid);
-  if (::fchmod(descriptor, target.existing->st_mode & 0777) != 0) target.fail(errno);
+  return ::fchmod(descriptor, target.existing->st_mode & 0777) == 0;
+}
+
+bool sync(int descriptor) {
+  return ::fsync(descriptor) == 0 || errno == EINVAL || errno == ENOTSUP;  // some file systems can't
 }
 
 }  // namespace
@@ -67,8 +71,8 @@ void OutputTarget::take(const struct stat& status) {
   if (error) fail(error.value());
 }
 
-void OutputTarget::fail(int error) const {
-  throw InputError(name.string(), std::string("can't be written: ") + std::strerror(error));
+void OutputTarget::fail(int error, const std::string& kept) const {
+  throw InputError(name.string(), std::string("can't be written: ") + std::strerror(error) + kept);
 }
 
 void OutputTarget::fail_writing(int error, const std::string& kept) const {
@@ -82,10 +86,11 @@ FileDescriptor open_stream(const OutputTarget& target) {
   return opened;
 }
 
-void put_in_place(const OutputTarget& target, int descriptor, const fs::path& temporary) {
-  if (target.existing) keep_owner_and_mode(target, descriptor);
-  const bool synced = ::fsync(descriptor) == 0 || errno == EINVAL || errno == ENOTSUP;  // some file systems can't
-  if (!synced || ::rename(temporary.c_str(), target.file.c_str()) != 0) target.fail(errno);
+void put_in_place(const OutputTarget& target, int descriptor, fs::path& temporary) {
+  const fs::path complete = std::exchange(temporary, {});
+  if ((target.existing && !keep_owner_and_mode(target, descriptor)) || !sync(descriptor) ||
+      ::rename(complete.c_str(), target.file.c_str()) != 0)
+    target.fail(errno, "; what was to be there is in " + complete.string());
 }
 
 TemporaryFile::TemporaryFile(OutputTarget target) : target_(std::move(target)) {
@@ -107,7 +112,6 @@ void TemporaryFile::write(std::string_view bytes) {
 
 void TemporaryFile::commit() {
   put_in_place(target_, file_.number(), path_);
-  path_.clear();
 }
 
 }  // namespace lapservo::internal

@@ -18,7 +18,7 @@ struct OutputTarget {
   explicit OutputTarget(const std::filesystem::path& name);
 
   bool is_stream() const { return file.empty(); }
-  [[noreturn]] void fail(int error) const;
+  [[noreturn]] void fail(int error, const std::string& kept = "") const;
   [[noreturn]] void fail_writing(int error, const std::string& kept = "") const;
 
   std::filesystem::path name;  ///< as it was given, for complaints
@@ -34,10 +34,12 @@ struct OutputTarget {
 FileDescriptor open_stream(const OutputTarget& target);
 
 /// Renames the complete file `temporary`, open as `descriptor`, to the target's name, when it is safely on the disk:
-/// with mode and owner of the file that it replaces. Throws InputError; that file stays then.
-void put_in_place(const OutputTarget& target, int descriptor, const std::filesystem::path& temporary);
+/// with mode and owner of the file that it replaces. Clears `temporary`. Where that fails, throws InputError naming the
+/// temporary file, which stays, as does the one to be replaced.
+void put_in_place(const OutputTarget& target, int descriptor, std::filesystem::path& temporary);
 
-/// A file beside its target, FILE.PID-N.part, until it is complete. A process that is killed leaves it there.
+/// A file beside its target, FILE.PID-N.part, until it is complete. A process that is killed leaves it there, as does
+/// put_in_place() where it fails.
 class TemporaryFile {
  public:
   /// The target must be a regular file. Throws InputError when it can't be made.

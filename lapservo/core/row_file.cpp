@@ -82,7 +82,6 @@ void RowFile::commit() {
   if (!begun_) begin();
   if (part_.empty()) return;
   put_in_place(target_, file_.number(), part_);
-  part_.clear();
 }
 
 fs::path RowFile::leave() {

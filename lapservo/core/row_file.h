@@ -10,9 +10,9 @@ namespace lapservo::internal {
 
 /// A table of a long run, which may be killed: each row is written when it comes, to `PATH.part`, which commit()
 /// renames to PATH. Without commit() it is removed, and the earlier PATH stays. If the process is killed, or can't
-/// write on, PATH.part stays with all whole rows. The next run of that PATH overwrites it with its first row if it
-/// begins with the same header and its writer is gone; any other file of that name is kept, and refused. Rows for a
-/// PATH that is no regular file are written into it as they come. See OutputTarget.
+/// write on, or can't rename it, PATH.part stays with all whole rows. The next run of that PATH overwrites it with its
+/// first row if it begins with the same header and its writer is gone; any other file of that name is kept, and
+/// refused. Rows for a PATH that is no regular file are written into it as they come. See OutputTarget.
 class RowFile {
  public:
   /// Throws InputError at once when it can't be written.

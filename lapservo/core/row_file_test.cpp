@@ -31,15 +31,13 @@ TEST(RowFile, LeavesAloneWhatIsNotItsOwnUnfinishedTable) {
   EXPECT_EQ(said(), refusal);
   EXPECT_EQ(read_file(path + ".part"), "my notes, quite long");
   fs::remove(path + ".part");
-  testing::write_file(folder / "elsewhere", "a,b\n");
-  fs::create_symlink("elsewhere", path + ".part");
+  testing::write_file(folder / "elsewhere", "a,b\n"), fs::create_symlink("elsewhere", path + ".part");
   EXPECT_EQ(said(), refusal);
-  fs::remove(path + ".part");
-  fs::create_directory(path + ".part");
+  fs::remove(path + ".part"), fs::create_directory(path + ".part");
   EXPECT_EQ(said(), refusal);
 }
 
-TEST(RowFile, LeftUnfinishedItReplacesNothing) {
+TEST(RowFile, LeftUnfinishedOrWithoutItsNameItReplacesNothingAndStays) {
   const TemporaryFolder folder;
   testing::write_file(folder / "o.csv", "earlier");
   RowFile file(folder / "o.csv", "a,b");
@@ -47,6 +45,14 @@ TEST(RowFile, LeftUnfinishedItReplacesNothing) {
   EXPECT_EQ(file.leave(), folder / "o.csv.part");
   EXPECT_EQ(read_file(folder / "o.csv"), "earlier");
   EXPECT_EQ(read_file(folder / "o.csv.part"), "a,b\n1,2\n");
+  const std::string path = (folder / "b.csv").string();
+  const auto write = [&] {
+    RowFile blocked(path, "a,b");
+    blocked.add("1,2"), fs::create_directory(path), blocked.commit();
+  };
+  EXPECT_EQ(input_error(write),
+            path + ": can't be written: Is a directory; what was to be there is in " + path + ".part");
+  EXPECT_EQ(read_file(path + ".part"), "a,b\n1,2\n");
 }
 
 TEST(RowFile, TwoRunsDoNotShareAFile) {

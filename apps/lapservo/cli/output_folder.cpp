@@ -99,7 +99,9 @@ std::set<std::string> checked(const fs::path& folder, const InputFiles& inputs, 
 void move_up(const fs::path& from, const fs::path& to, const std::string& name) {
   std::error_code error;
   fs::rename(from / name, to / name, error);
-  if (error) fail(to / name, error);
+  if (error)
+    throw InputError((to / name).string(),
+                     "can't be written: " + error.message() + "; the results are in " + from.string());
 }
 
 }  // namespace
