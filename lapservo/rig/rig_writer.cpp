@@ -133,11 +133,24 @@ std::string transform_yaml(const Instrument& instrument, int indent) {
   return lines.text();
 }
 
+// Relative to the folder, by the names of links on the way: they may lead elsewhere later. Empty where there is none.
+fs::path path_from(const fs::path& folder, const fs::path& file) {
+  std::error_code error;
+  fs::path relative = file.lexically_relative(folder);
+  if (fs::equivalent(folder / relative, file, error)) return relative;
+  relative = fs::relative(file.parent_path(), folder, error);  // a link with ".." behind it
+  return relative.empty() ? relative : (relative / file.filename()).lexically_normal();
+}
+
+// A rig that a link in another folder leads to is read from both.
 std::string path_yaml(const fs::path& file, const fs::path& destination) {
   std::error_code error;
-  const fs::path relative = fs::relative(file, fs::absolute(destination, error).parent_path(), error);
+  const fs::path whole = fs::absolute(file, error), folder = fs::absolute(destination, error).parent_path();
+  const bool in_two_folders = fs::is_symlink(destination, error) &&
+                              !fs::equivalent(fs::canonical(destination, error).parent_path(), folder, error);
+  const fs::path relative = in_two_folders ? fs::path() : path_from(folder, whole);
   YAML::Emitter text;
-  text << (relative.empty() ? fs::absolute(file, error) : relative).string();
+  text << (relative.empty() ? whole : relative).string();
   return text.c_str();
 }
 

@@ -8,7 +8,7 @@
 namespace lapservo::internal {
 
 /// The rig as YAML that parse_rig() reads back to the last bit. With the file that it is written to, a camera_file is
-/// named so that it is found from there; else the camera stands in the rig itself.
+/// named so that it is found from there, links by their own names; else the camera stands in the rig itself.
 std::string rig_yaml(const Rig& rig, const std::filesystem::path& destination = {});
 
 /// The same of a rig that was measured. Throws InputError naming the file where parse_rig() would not take it.

@@ -136,22 +136,29 @@ TEST(RigWriter, WhatARigLeavesOutStaysLeftOut) {
 
 TEST(RigWriter, NamesACamerasFileFromWhereverTheRigGoes) {
   const testing::TemporaryFolder folder;
-  std::filesystem::create_directories(folder / "home/cameras");
+  std::filesystem::create_directories(folder / "home/lenses");
+  std::filesystem::create_directory_symlink("lenses", folder / "home/cameras");
+  std::filesystem::create_symlink("v3.yaml", folder / "home/lenses/a: b.yaml");
+  std::filesystem::create_symlink("home/lenses/linked.yaml", folder / "link.yaml");
   const std::string text = every_key;
   const std::size_t instruments = text.find("instruments:");
   const Camera camera = parse_rig(every_key, "rig.yaml").camera;
-  testing::write_file(folder / "home/cameras/a: b.yaml", camera_yaml(camera));
+  testing::write_file(folder / "home/lenses/v3.yaml", camera_yaml(camera));
   testing::write_file(folder / "home/rig.yaml", "camera: 'cameras/a: b.yaml'\n" + text.substr(instruments));
   const Rig rig = load_rig(folder / "home/rig.yaml");
   EXPECT_EQ(rig.camera, camera);
-  for (const char* place : {"home/rig.yaml", "home/new.yaml", "away.yaml", "home/cameras/new.yaml"}) {
+  for (const char* place : {"home/rig.yaml", "home/new.yaml", "away.yaml", "home/cameras/new.yaml", "link.yaml"}) {
     const auto path = folder / place;
     testing::write_file(path, rig_yaml(rig, path));
-    const Rig moved = load_rig(path);
-    EXPECT_TRUE(std::filesystem::equivalent(moved.camera_file, rig.camera_file)) << place;
-    EXPECT_EQ(moved.camera, camera) << place;
-    EXPECT_EQ(moved.instruments, rig.instruments) << place;
+    for (const auto& name : {path, std::filesystem::canonical(path)}) {
+      const Rig moved = load_rig(name);
+      EXPECT_TRUE(std::filesystem::equivalent(moved.camera_file, rig.camera_file)) << name;
+      EXPECT_EQ(moved.camera_file.filename(), "a: b.yaml") << name;
+      EXPECT_EQ(moved.camera, camera) << name;
+      EXPECT_EQ(moved.instruments, rig.instruments) << name;
+    }
   }
+  EXPECT_TRUE(has(testing::read_file(folder / "away.yaml"), "home/cameras/a: b.yaml"));
   EXPECT_EQ(rig_yaml(rig), every_key) << "on its own";
 }
 
