@@ -43,6 +43,9 @@ const std::string track = "track swing --fps 8 --rig rig.yaml --out seen.csv", c
                   camera = "calibrate camera boards --board 9x6 --square-mm 5 --rig rig.yaml --out out.yaml",
                   servo = "servo --rig rig.yaml --robot sim --duration 1 --out run --set-point 2.43,1194,245,175";
 
+// A pipe of joints, which is opened when the rig has been read.
+constexpr auto edit_when_read = "mkfifo late.csv; (echo '# mine' >>rig.yaml; cat swing_joints.csv) >late.csv &";
+
 using Changes = std::vector<std::pair<std::string, std::string>>;
 
 struct Mistake {
@@ -222,9 +225,8 @@ std::vector<Mistake> mistakes() {
       {"squares for inner corners", [] {}, {changed(camera, {{"9x6", "10x7"}})}, {"number of inner corners"}},
       {"rig edited meanwhile",
        [] {
-         in_rig({})();  // the pipe is written when the rig is read
-         const char* pipe = "mkfifo late.csv; (echo '# mine' >>rig.yaml; cat swing_joints.csv) >late.csv &";
-         EXPECT_EQ(std::system(pipe), 0);
+         in_rig({})();
+         EXPECT_EQ(std::system(edit_when_read), 0);
        },
        {"calibrate registration swing --fps 8 --joints late.csv --rig rig.yaml --out ./rig.yaml"},
        {"rig.yaml: was changed while this ran", "repeat the command"}},

@@ -84,9 +84,7 @@ TEST_F(Outputs, OfEveryCommandKeepLinksModesAndDevices) {
 
     for (const auto& entry : fs::directory_iterator("out"))
       EXPECT_NE(entry.path().extension(), ".part") << entry.path();
-    fs::remove_all("out");
-    fs::create_directory("out");
-    fs::remove("piped");
+    fs::remove_all("out"), fs::create_directory("out"), fs::remove("piped");
   }
 }
 
@@ -149,8 +147,7 @@ TEST_F(Outputs, FoldersOfARunAreReplacedOnlyWhenAsked) {
   expect_refused("experiment rcm --out frames", {"--force"});
   EXPECT_EQ(read_file("frames/0000.png"), first);
   fs::create_directory("frames.part");
-  write_file("frames.part/mine", "mine");
-  write_file("frames/notes.txt", "mine");
+  write_file("frames.part/mine", "mine"), write_file("frames/notes.txt", "mine");
   fs::create_symlink("frames", "link");
   const std::vector<std::string> same{"frames/", "frames/../frames", "link", "link/", fs::current_path() / "frames"};
   for (const std::string& path : same) {

@@ -113,13 +113,10 @@ TEST(VideoSource, MarksDamagedFramesOfSeveralSlices) {
     GTEST_SKIP() << "FFmpeg here lacks libx264";
   EXPECT_EQ(read_video(folder / "a.h264").complaint, "");
   const std::string whole = read_file(folder / "a.h264");
-  int told = 0;
-  constexpr int tries = 8;
-  for (int i = 0; i < tries; ++i) {
-    testing::write_file(folder / "a.h264", with_damage(whole, whole.size() / 2, static_cast<std::uint64_t>(i)));
-    told += read_video(folder / "a.h264").damaged > 0;
+  for (std::uint64_t i = 0; i < 8; ++i) {
+    testing::write_file(folder / "a.h264", with_damage(whole, whole.size() / 2, i));
+    EXPECT_GT(read_video(folder / "a.h264").damaged, 0) << i;
   }
-  EXPECT_EQ(told, tries);
 }
 
 // A flipped bit may let an image of motion JPEG end before its data do, with shifted rows or other colours: FFmpeg's
