@@ -43,7 +43,7 @@ class CrtkArm {
   mutable std::mutex mutex_;  // of what the transport's threads touch
   std::optional<std::vector<double>> setpoint_;
   double arrival_s_ = 0;  // of it
-  bool obeys_ = true;     // by the state that was said last
+  bool obeys_ = false;    // by the state that was said last
   std::vector<std::string> commands_;
   long malformed_ = 0;
   std::vector<Transport::Subscription> subscriptions_;  // last: they use the others

@@ -14,10 +14,10 @@ using Positions = std::vector<double>;
 TEST(CrtkArm, GivesTheNewestSetpointOnceAndDropsWhatIsNotOfItsJoints) {
   TestTransport transport;
   CrtkArm arm(transport, "A", {"a", "b"});
-  EXPECT_FALSE(arm.new_setpoint());
   const auto say = [&](const std::vector<std::string>& names, const Positions& positions) {
     transport.say("/A/servo_jp", JointMessage{1, names, positions});
   };
+  arm.say_state({0, "ENABLED", true, false});
   say({"a", "b"}, {1, 2});
   say({}, {3, 4});
   EXPECT_EQ(arm.new_setpoint(), Positions({3, 4}));
@@ -30,7 +30,7 @@ TEST(CrtkArm, GivesTheNewestSetpointOnceAndDropsWhatIsNotOfItsJoints) {
   EXPECT_EQ(arm.malformed(), 3);
 }
 
-// By then the arm may be elsewhere; a hiccup of 0.3 s must not lose where the loop has braked it.
+// The arm may be elsewhere; a hiccup of 0.3 s must not lose where the loop has braked it.
 TEST(CrtkArm, ASetpointIsVoidOnceTheLoopHasGivenItUpOrTheArmDidNotObey) {
   TestTransport transport;
   CrtkArm arm(transport, "A", {"a"});
@@ -41,6 +41,7 @@ TEST(CrtkArm, ASetpointIsVoidOnceTheLoopHasGivenItUpOrTheArmDidNotObey) {
     return arm.new_setpoint().has_value();
   };
   const OperatingStateMessage enabled{0, "ENABLED", true, false};
+  EXPECT_FALSE(remains(0, {enabled}));  // came before the arm said anything
   EXPECT_TRUE(remains(0.3, {enabled}));
   EXPECT_FALSE(remains(0.8, {enabled}));
   EXPECT_FALSE(remains(0, {{0, "PAUSED", true, false}, enabled}));
@@ -64,8 +65,7 @@ TEST(CrtkArm, SaysAStateAtEachChangeAndEveryHalfSecond) {
   const OperatingStateMessage enabled{0, "ENABLED", true, false};
   for (int i = 0; i < 100; ++i, transport.stamp_s += 0.01) arm.say_state(enabled);
   EXPECT_EQ(count(), 2u);
-  arm.say_state({0, "ENABLED", true, true});
-  arm.say_state({0, "ENABLED", false, true});
+  for (const bool is_homed : {true, false}) arm.say_state({0, "ENABLED", is_homed, true});
   arm.say_state({0, "PAUSED", false, true});
   EXPECT_EQ(count(), 5u);
   EXPECT_EQ(transport.sent<OperatingStateMessage>("/A/operating_state").back().stamp_s, transport.stamp_s);
