@@ -234,6 +234,7 @@ void Interlock::follow(const JointPath& path) {
   if (untold_ != Blocked::none) return;
   path_ = path;
   released_ = false;
+  followed_s_.reset();
 }
 
 Blocked Interlock::blocked(double now_s) const {
@@ -397,6 +398,8 @@ std::optional<std::vector<double>> Interlock::tick(double now_s) {
   // While the arm could not be moved by us it may have been by others.
   if (phase_ == Phase::idle && !(setpoint_->arrival_s > blocked_s_)) return std::nullopt;
   if (phase_ != Phase::following) start(now_s);
+  if (!followed_s_) followed_s_ = now_s;
+  if (now_s - *followed_s_ > unwatched_s) released_ = true;
   const MotionState motion = path_->at(now_s);
   const bool rests = approach(motion);
   if (rests) velocity_.setZero();

@@ -63,7 +63,8 @@ struct InterlockCounts {
 /// late a period is. Joints beyond the four stay at their setpoint of the start, but the wrist of the tool belongs to
 /// somebody else: it may move, and its setpoints pass through. As soon as the arm is not ready the path is dropped: an
 /// arm that does not obey gets nothing more, one that still listens is braked to rest first. state() reports the
-/// reason, however short it was, and no new path is followed before.
+/// reason, however short it was, and no new path is followed before. A path that no newer one replaces for 0.5 s counts
+/// as released: its loop has ended or stands still.
 ///
 /// A topic belongs to its first sender: messages of another one are not used before the arm has fallen silent. Then it
 /// is another arm, of which nothing is known yet.
@@ -165,7 +166,8 @@ class Interlock {
   Phase phase_ = Phase::idle;
   std::optional<JointPath> path_;
   bool released_ = false;
-  bool continues_ = false;  ///< from what was sent last: it was silent only
+  std::optional<double> followed_s_;  // the first tick with this path
+  bool continues_ = false;            ///< from what was sent last: it was silent only
   std::optional<double> ticked_s_;
   double blocked_s_ = 0;                  // when something was amiss last
   std::optional<double> silent_since_s_;  // of an arm that moved
