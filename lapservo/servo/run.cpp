@@ -56,10 +56,24 @@ class BrakesAtTheEnd {
       : arm_(arm), clock_(clock), lasts_s_(stopping_time_s(config.limits) + config.period_s) {}
   ~BrakesAtTheEnd() {
     try {
-      arm_.end();
-      clock_.sleep_until(clock_.now_s() + lasts_s_);
-    } catch (...) {  // of a port that is gone: the path brakes by itself
+      brake();
+    } catch (...) {  // what ended the loop is on its way already
     }
+  }
+  // Throws what a port throws first; the path brakes by itself then.
+  void brake() {
+    if (std::exchange(braked_, true)) return;
+    const auto wait = [&] { clock_.sleep_until(clock_.now_s() + lasts_s_); };
+    try {
+      arm_.end();
+    } catch (...) {
+      try {
+        wait();
+      } catch (...) {  // the first counts
+      }
+      throw;
+    }
+    wait();
   }
   BrakesAtTheEnd(const BrakesAtTheEnd&) = delete;
   BrakesAtTheEnd& operator=(const BrakesAtTheEnd&) = delete;
@@ -68,6 +82,7 @@ class BrakesAtTheEnd {
   Supervisor& arm_;
   Clock& clock_;
   double lasts_s_;
+  bool braked_ = false;
 };
 
 // Those of another clock would be compared with the wrong moments.
@@ -172,7 +187,7 @@ void run(Supervisor& arm, ImageStream& images, Clock& clock, const RunConfig& co
   };
   const Trajectory seen_then{0, features_then, {}};
   const auto ticks = std::lround(duration_s / period_s);
-  const BrakesAtTheEnd brakes(arm, clock, controller);
+  BrakesAtTheEnd brakes(arm, clock, controller);
   bool go_on = true, held = false;
   int registration = 0;
   for (long k = 0; k < ticks && go_on;) {
@@ -218,6 +233,7 @@ void run(Supervisor& arm, ImageStream& images, Clock& clock, const RunConfig& co
     k = std::max(k + 1, std::lround((clock.now_s() - start_s) / period_s));
     clock.sleep_until(start_s + static_cast<double>(k) * period_s);
   }
+  brakes.brake();
 }
 
 }  // namespace lapservo

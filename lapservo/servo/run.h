@@ -58,14 +58,14 @@ class RunObserver {
 };
 
 /// The servo loop: reads the joints, measures, decides, sends, then calls the observer, once every
-/// ControllerConfig::period_s for `duration_s`; then, and whenever an exception ends it, lets the arm brake to rest. A
-/// missing or stale image, a lost marker, an outlier or a number that is not finite make it hold within the tick; it
-/// continues by itself when the cause ends within SupervisorConfig::max_loop_hold_s. After anything else it holds until
-/// a start (see SupervisorState), and then until an image shows the instrument. A late tick shifts none of those after
-/// it. The trajectory begins when the loop moves the arm first, and its time stands while the supervisor or the loop
-/// holds the arm, however shortly: the arm goes on where it left the path; `duration_s` runs on. Where the endoscope
-/// moves it releases the arm, measures camera_from_rcm anew from motion that the operator makes, and continues after a
-/// start.
+/// ControllerConfig::period_s for `duration_s`; then, and whenever an exception ends it, lets the arm brake to rest. An
+/// exception of a port meanwhile is thrown after that, unless another one ended the loop. A missing or stale image, a
+/// lost marker, an outlier or a number that is not finite make it hold within the tick; it continues by itself when the
+/// cause ends within SupervisorConfig::max_loop_hold_s. After anything else it holds until a start (see
+/// SupervisorState), and then until an image shows the instrument. A late tick shifts none of those after it. The
+/// trajectory begins when the loop moves the arm first, and its time stands while the supervisor or the loop holds the
+/// arm, however shortly: the arm goes on where it left the path; `duration_s` runs on. Where the endoscope moves it
+/// releases the arm, measures camera_from_rcm anew from motion that the operator makes, and continues after a start.
 ///
 /// Throws InputError before anything moves: without RunConfig::arm_limits where the arm is not simulated; for a
 /// duration or a clock's time that is not finite; for joints or a first image stamped more than a second ahead of the

@@ -256,9 +256,16 @@ def test_what_a_port_raises_leaves_the_run(rig):
         def state(self):
             raise ZeroDivisionError("the arm's driver")
 
-    simulator = lapservo.Simulator(rig, Q)
-    with pytest.raises(ZeroDivisionError, match="the arm's driver"):
-        errors_of_a_run(rig, Broken(simulator), simulator, simulator)
+    class Stuck(Arm):
+        def release(self):
+            raise ZeroDivisionError("the arm's driver")
+
+    for robot in (Broken, Stuck):
+        simulator = lapservo.Simulator(rig, Q)
+        begin_s = simulator.now_s()
+        with pytest.raises(ZeroDivisionError, match="the arm's driver"):
+            errors_of_a_run(rig, robot(simulator), simulator, simulator, 0.5)
+    assert simulator.now_s() - begin_s > 0.7  # the rest was waited for
 
     class Empty(lapservo.Robot):
         def is_simulated(self):
