@@ -58,6 +58,8 @@ void check_limits(const JointLimits& limits, double period_s) {
     require(std::isfinite(limits.upper[i]) && limits.upper[i] > limits.lower[i], element("limits.upper", i),
             limits.upper[i], "a number above the lower limit");
   }
+  // An offset between an arm's joints and q moves a range, which keeps its width.
+  require_plausible("(limits.upper - limits.lower) / 2", (limits.upper - limits.lower) / 2, joint_positions);
   require(period_s <= 2 * stopping_time_s(limits), "period_s", period_s,
           "at most twice the joints' stopping time, rate / acceleration: lower acceleration along with rate");
 }

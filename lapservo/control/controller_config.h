@@ -27,7 +27,8 @@ struct TrackingGains {
   Eigen::Vector4d per_s{5, 5, 5, 5};
 };
 
-/// Bounds of the joints as the arm reads them: theta, phi, rho, psi.
+/// Bounds of the joints as the arm reads them: theta, phi, rho, psi; rad and m. Ranges, rates and accelerations that
+/// look like degrees or millimetres are refused.
 struct JointLimits {
   Eigen::Vector4d lower{-1, 0.6, 0.03, -4};
   Eigen::Vector4d upper{1, 2.5, 0.2, 4};

@@ -723,7 +723,7 @@ std::string wrong_rig_of(const Eigen::Vector4d& sign, const Eigen::Quaterniond& 
   RunConfig config = config_of(rig, {});
   Rigid3& believed = *config.rig.instruments[0].camera_from_rcm;
   believed.rotation = turned * believed.rotation;
-  config.controller.limits.lower.setConstant(-7), config.controller.limits.upper.setConstant(7);
+  config.controller.limits.lower = {-6, -6, -1, -7}, config.controller.limits.upper = {6, 6, 1, 7};
   Simulator simulator(rig, {}, std::make_unique<MirroredArm>(sign));
   OperatedArm arm(simulator);
   Watcher watcher(rig, simulator, &arm);

@@ -396,7 +396,7 @@ void bind_servo(py::module_& m) {
            py::arg("joint_limits") = py::none(),
            "mode: 'fused', 'paper' or 'uncalibrated'; path: a controller.yaml, read over the rest; delay_s: known, "
            "else estimated; joint_limits: the path of a file of the arm's, as configs/joint_limits/psm-classic.yaml, "
-           "or lower, upper, rate and acceleration of q, float[4] each.")
+           "or lower, upper, rate and acceleration of q, float[4] each, in rad and m.")
       .def_property_readonly("mode", [](const Controller& self) { return std::string(to_string(self.mode)); })
       .def_property_readonly("period_s", [](const Controller& self) { return self.period_s; })
       .def(

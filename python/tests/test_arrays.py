@@ -192,6 +192,8 @@ def test_what_a_trajectory_or_arm_in_python_gives_is_refused_by_name(rig):
     assert refused(lapservo.run, Arm(), simulator, simulator, rig, goal, 1).field == "arm_limits"
     for given in ([[-1] * 4] * 3, [[-1] * 3] * 4, [[-1, np.nan, 0, 0]] * 4, 3):
         assert refused(lapservo.Controller, rig, joint_limits=given).source == "joint_limits"
+    degrees = [[-57, 0, 0, -229], [57, 143, 70, 229], [0.4, 0.4, 0.04, 1.5], [2, 2, 0.2, 7.5]]
+    assert "57 looks like degrees" in refused(lapservo.Controller, rig, joint_limits=degrees).expectation
     limits = [[-1, 0.6, 0.03, -4], [1, 2.5, 0.2, 4], [0.4, 0.4, 0.04, 1.5], [2, 2, 0.2, 7.5]]
     controller = lapservo.Controller(rig, joint_limits=limits)
     assert refused(lapservo.run, Arm(), simulator, simulator, rig, goal, 1, controller=controller).source == "Robot.readings()"
