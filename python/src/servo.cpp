@@ -74,6 +74,7 @@ class PythonRobot : public Robot {
 class PythonClock : public Clock {
  public:
   double now_s() const override { PYBIND11_OVERRIDE_PURE(double, Clock, now_s); }
+  double suspended_s() const override { PYBIND11_OVERRIDE(double, Clock, suspended_s); }
   void sleep_until(double time_s) override { PYBIND11_OVERRIDE_PURE(void, Clock, sleep_until, time_s); }
 };
 
@@ -90,6 +91,7 @@ class PythonImageStream : public ImageStream {
     return StampedImage{number_of(pair[0], "ImageStream.newest()", Numbers::any),
                         view_of(pair[1], "ImageStream.newest()").clone()};
   }
+  bool take_second_sender() override { PYBIND11_OVERRIDE(bool, ImageStream, take_second_sender); }
 };
 
 void bind_ports(py::module_& m) {
@@ -169,10 +171,16 @@ own rate, and forgets it as soon as it is not enabled.)")
 it is called up to 2000 times a second.
 
 time_s, on the loop's clock: of the exposure where it is known (then set the controller's delay_s to 0), else of the
-arrival.)");
+arrival.)")
+      .def("take_second_sender", &ImageStream::take_second_sender, py::call_guard<py::gil_scoped_release>(),
+           "True once when another camera's images come beside this one's, or after them: the loop holds until a "
+           "start. May be left out, but for a camera that passes another one's images on.");
   py::class_<Clock, PythonClock>(m, "Clock", "The loop's time: subclass it, or take SteadyClock.")
       .def(py::init<>())
       .def("now_s", &Clock::now_s, py::call_guard<py::gil_scoped_release>(), "Seconds; never backwards.")
+      .def("suspended_s", &Clock::suspended_s, py::call_guard<py::gil_scoped_release>(),
+           "At least so many seconds now_s() has left out so far because the computer was suspended, after which the "
+           "loop holds until a start. May be left out, but for a clock that passes another one's time on.")
       .def("sleep_until", &Clock::sleep_until, py::arg("time_s"), py::call_guard<py::gil_scoped_release>(),
            "Returns at that time, or at once when it has passed.");
   py::class_<SteadyClock, Clock>(m, "SteadyClock", "The computer's monotonic clock.").def(py::init<>());

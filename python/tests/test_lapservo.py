@@ -251,6 +251,24 @@ def test_ports_in_python_do_what_the_simulators_do(rig):
     assert arm.sent > 100
 
 
+@pytest.mark.parametrize("event", ["second_camera", "loop_late"])
+def test_what_a_port_in_python_passes_on_holds_until_a_start(rig, event):
+    class Passed(Eye):
+        def take_second_sender(self):
+            return event == "second_camera" and self.simulator.now_s() > 0.5
+
+    class Suspended(Time):
+        def suspended_s(self):
+            return float(event == "loop_late" and self.simulator.now_s() > 0.5)
+
+    simulator, blocked = lapservo.Simulator(rig, Q), []
+    assert not simulator.take_second_sender() and simulator.suspended_s() == 0
+    lapservo.run(Arm(simulator), Passed(simulator), Suspended(simulator), rig,
+                 lapservo.set_point(lapservo.Kinematics(rig).features(Q)), 1,
+                 on_tick=lambda tick: blocked.append(tick.joints.blocked))
+    assert blocked[20] == "none" and blocked[-1] == event
+
+
 def test_what_a_port_raises_leaves_the_run(rig):
     class Broken(Arm):
         def state(self):
