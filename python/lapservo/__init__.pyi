@@ -1,7 +1,7 @@
 import os
 from collections.abc import Callable, Mapping, Sequence
 from types import TracebackType
-from typing import Optional, Union, overload
+from typing import Optional, Union, final, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -251,9 +251,11 @@ class Clock:
     def suspended_s(self) -> float: ...
     def sleep_until(self, time_s: float) -> None: ...
 
+@final
 class SteadyClock(Clock):
     def __init__(self) -> None: ...
 
+@final
 class Ros2Robot(Robot):
     def __init__(
         self,
@@ -269,6 +271,7 @@ class Ros2Robot(Robot):
     ) -> None: ...
     def state(self) -> JointState: ...
 
+@final
 class Ros2Camera(ImageStream):
     def __init__(self, topic: str, rig: Rig, clock: SteadyClock) -> None: ...
     dropped: str
@@ -347,6 +350,7 @@ class Renderer:
     ) -> None: ...
     def render(self, q: ArrayLike, seed: int = ...) -> _Image: ...
 
+@final
 class Simulator(Robot, ImageStream, Clock):
     def __init__(
         self,

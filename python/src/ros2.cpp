@@ -117,10 +117,11 @@ std::unique_ptr<Ros2Robot> make_robot(const std::string& arm, const Rig& rig, co
 }
 
 void bind_loop_side(py::module_& m) {
-  py::class_<Ros2Robot, Robot>(m, "Ros2Robot", R"(A CRTK arm over ROS 2, behind the interlock of `lapservo servo`.
+  py::class_<Ros2Robot, Robot> robot(m, "Ros2Robot", R"(A CRTK arm over ROS 2, behind the interlock of `lapservo servo`.
 
 ROS need not be installed. A thread of its own samples the last path 500 times a second; when anything is amiss nothing
-is sent.)")
+is sent.)");
+  robot
       .def(py::init(&make_robot), py::arg("arm"), py::arg("rig"), py::arg("controller"), py::arg("clock"),
            py::kw_only(), py::arg("enable_motion") = false, py::arg("setpoint_readers") = 1, py::arg("wait_s") = 15.0,
            py::arg("instrument") = py::none(), py::keep_alive<1, 5>(),
@@ -132,7 +133,9 @@ is sent.)")
           "state", [](Ros2Robot& self) { return unlocked([&] { return loop_asks ? self.state() : self.latest(); }); },
           "JointState as it is now, in any thread. A short fault is reported to run() alone, also through the state() "
           "of a Robot that passes this one's on.");
-  py::class_<Ros2Camera, ImageStream>(m, "Ros2Camera", "The newest image of a topic of ROS 2.")
+  refuse_subclasses(robot, "Robot");
+  py::class_<Ros2Camera, ImageStream> camera(m, "Ros2Camera", "The newest image of a topic of ROS 2.");
+  camera
       .def(py::init([](const std::string& topic, const Rig& rig, const SteadyClock& clock) {
              return std::make_unique<Ros2Camera>(topic, rig.camera, clock);
            }),
@@ -140,6 +143,7 @@ is sent.)")
            "topic: '/endoscope/image_raw', or '.../compressed'; images must have the size of the rig's camera.")
       .def_property_readonly("dropped", &Ros2Camera::dropped, "counts of images that were not used, or ''")
       .def_property_readonly("complaint", &Ros2Camera::complaint, "why the last of them was not used, or ''");
+  refuse_subclasses(camera, "ImageStream");
 }
 
 void bind_arm_side(py::module_& m) {

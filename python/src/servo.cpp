@@ -183,7 +183,8 @@ arrival.)")
            "loop holds until a start. May be left out, but for a clock that passes another one's time on.")
       .def("sleep_until", &Clock::sleep_until, py::arg("time_s"), py::call_guard<py::gil_scoped_release>(),
            "Returns at that time, or at once when it has passed.");
-  py::class_<SteadyClock, Clock>(m, "SteadyClock", "The computer's monotonic clock.").def(py::init<>());
+  refuse_subclasses(
+      py::class_<SteadyClock, Clock>(m, "SteadyClock", "The computer's monotonic clock.").def(py::init<>()), "Clock");
 }
 
 DesiredFeatures desired_of(const py::object& given) {

@@ -92,10 +92,12 @@ void bind_simulation(py::module_& m) {
 
   const ArmConfig arm;
   const EndoscopeConfig endoscope;
-  py::class_<Simulator, Robot, ImageStream, Clock>(m, "Simulator", R"(Arm, endoscope and clock of a simulated theatre.
+  py::class_<Simulator, Robot, ImageStream, Clock> simulator(m, "Simulator",
+                                                             R"(Arm, endoscope and clock of a simulated theatre.
 
 All three ports of run() at once. Time is simulated: it passes in sleep_until() and step() only. The same arguments and
-commands give the same frames.)")
+commands give the same frames.)");
+  simulator
       .def(py::init(&make_simulator), py::arg("rig"), py::arg("q"), py::kw_only(), py::arg("seed") = 1,
            py::arg("frame_rate_hz") = endoscope.frame_rate_hz, py::arg("latency_s") = endoscope.latency_s,
            py::arg("exposure_s") = endoscope.exposure_s, py::arg("joint_offset") = arm.joint_offset,
@@ -112,6 +114,7 @@ commands give the same frames.)")
             self.cover_marker({begin_s, end_s});
           },
           py::arg("begin_s"), py::arg("end_s"), "Something lies over the whole marker then.");
+  refuse_subclasses(simulator, "Robot, ImageStream or Clock");
 }
 
 }  // namespace lapservo::python

@@ -251,6 +251,15 @@ def test_ports_in_python_do_what_the_simulators_do(rig):
     assert arm.sent > 100
 
 
+def test_a_port_whose_overrides_nobody_calls_has_no_subclasses():
+    ports = lapservo.Robot, lapservo.ImageStream, lapservo.Clock
+    made = [thing for thing in vars(lapservo).values() if isinstance(thing, type) and issubclass(thing, ports) and thing not in ports]
+    assert len(made) in (2, 4)  # without ROS 2, with it
+    for each in made:
+        with pytest.raises(TypeError, match=rf"subclass of {each.__name__}: subclass .*, and pass calls on to a {each.__name__}"):
+            type("Guarded", (each,), {})
+
+
 @pytest.mark.parametrize("event", ["second_camera", "loop_late"])
 def test_what_a_port_in_python_passes_on_holds_until_a_start(rig, event):
     class Passed(Eye):
