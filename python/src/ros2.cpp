@@ -34,7 +34,7 @@ struct Node {
 
 class Ros2Robot : private Node, public CrtkRobot, public ArmOf {
  public:
-  Ros2Robot(const std::string& arm, const std::string& steered, const InterlockConfig& interlock, const Clock& clock)
+  Ros2Robot(const std::string& arm, const Instrument& steered, const InterlockConfig& interlock, const Clock& clock)
       : CrtkRobot(transport, arm, interlock, clock), ArmOf{steered} {}
 };
 
@@ -110,8 +110,9 @@ std::unique_ptr<Ros2Robot> make_robot(const std::string& arm, const Rig& rig, co
         fmt::format("{}, or instrument='{}' where that is the arm's name in the rig", wanted, instrument.name));
   if (!instrument.joints)
     throw InputError("Ros2Robot", "rig", "without joints", "the arm's joints: names, sign, offset");
+  controller.expect_own(rig, "Ros2Robot");
   auto robot = std::make_unique<Ros2Robot>(
-      arm, instrument.name, interlock_of(instrument, controller.limits, enable_motion, setpoint_readers), clock);
+      arm, instrument, interlock_of(instrument, controller.limits, enable_motion, setpoint_readers), clock);
   wait_for_joints(*robot, arm, wait_s);
   return robot;
 }
@@ -126,7 +127,8 @@ is sent.)");
            py::kw_only(), py::arg("enable_motion") = false, py::arg("setpoint_readers") = 1, py::arg("wait_s") = 15.0,
            py::arg("instrument") = py::none(), py::keep_alive<1, 5>(),
            "arm: its namespace, 'PSM1'; rig: with the arm's joints, whose first instrument has the arm's name, or that "
-           "of `instrument`; controller: whose limits no setpoint exceeds, of joint_limits; enable_motion: else "
+           "of `instrument`; controller: of this rig, whose limits no setpoint exceeds, of joint_limits; "
+           "enable_motion: else "
            "nothing is sent; setpoint_readers: nodes that may read servo_jp, the "
            "arm's and others; wait_s: for the arm's joints, without which InputError is raised.")
       .def(

@@ -19,6 +19,7 @@
 #include "lapservo/servo/image_features.h"
 #include "lapservo/servo/image_window.h"
 #include "lapservo/servo/run.h"
+#include "lapservo/tool/wrist.h"
 #include "python/src/bindings.h"
 #include "python/src/controller.h"
 #include "python/src/conversions.h"
@@ -272,7 +273,7 @@ Controller make_controller(const Rig& rig, const std::string& mode, const std::o
   if (delay_s) config.observer.delay_s = *delay_s;
   std::optional<JointLimits> of_arm;
   if (joint_limits) of_arm = joint_limits_of(*joint_limits, rig);
-  return {controller_for_arm(config, path, of_arm), of_arm.has_value()};
+  return {controller_for_arm(config, path, of_arm), of_arm.has_value(), rig.camera, rig.instruments.front().joints};
 }
 
 // A tick as Python keeps it.
@@ -367,14 +368,20 @@ void bind_tick(py::module_& m) {
 void run_loop(Robot& robot, ImageStream& images, Clock& clock, const std::shared_ptr<Rig>& rig,
               const Trajectory& trajectory, double duration_s, const std::optional<Controller>& controller,
               const std::optional<Array<"rcm_px", 2>>& rcm_px, bool own_thread, py::object on_tick) {
-  const auto* arm = dynamic_cast<const ArmOf*>(&robot);
-  if (arm && arm->instrument != rig->instruments.front().name)
-    throw InputError("run", "rig.instruments[0]", rig->instruments.front().name,
-                     arm->instrument + ", which the robot moves");
+  const Instrument& steered = rig->instruments.front();
+  if (const auto* arm = dynamic_cast<const ArmOf*>(&robot)) {
+    const Instrument& moved = arm->instrument;
+    if (moved.name != steered.name)
+      throw InputError("run", "rig.instruments[0]", steered.name, moved.name + ", which the robot moves");
+    if (moved.joints != steered.joints || internal::wrist_names(moved.tool) != internal::wrist_names(steered.tool))
+      throw InputError("run", "rig.instruments[0].joints", "others",
+                       "those by which the robot reads its arm: make the robot of this rig");
+  }
   RunConfig config;
   config.rig = *rig;
   const Controller used =
       controller ? *controller : make_controller(*rig, "fused", {}, ControllerConfig{}.period_s, {}, {}, 20, {});
+  used.expect_own(*rig, "run");
   config.controller = used;
   if (used.has_joint_limits) config.arm_limits = used.limits;
   if (used.mode == ControlMode::uncalibrated) {
@@ -398,7 +405,7 @@ void run_loop(Robot& robot, ImageStream& images, Clock& clock, const std::shared
 void bind_servo(py::module_& m) {
   bind_ports(m);
   bind_trajectories(m);
-  py::class_<Controller>(m, "Controller", "How a loop steers.")
+  py::class_<Controller>(m, "Controller", "How a loop steers the rig of which it is made.")
       .def(py::init(&make_controller), py::arg("rig"), py::kw_only(), py::arg("mode") = "fused",
            py::arg("path") = py::none(), py::arg("period_s") = ControllerConfig{}.period_s,
            py::arg("gains_per_s") = py::none(), py::arg("delay_s") = py::none(), py::arg("window_margin_px") = 20.0,

@@ -10,6 +10,7 @@ import time
 import numpy as np
 import pytest
 from conftest import Q, SOURCE
+from test_lapservo import with_shifted_joints
 
 import lapservo
 
@@ -112,6 +113,10 @@ def test_an_arm_is_moved_by_its_own_entry_of_the_rig_only(theatre, rig):
     images = lapservo.Ros2Camera("/endoscope/image_raw", rig, clock)
     with pytest.raises(lapservo.InputError, match="is PSM2, expected PSM1, which the robot moves"):
         lapservo.run(robot, images, clock, both, lapservo.paper_trajectory(), 1)
+    with pytest.raises(lapservo.InputError, match="joints: is others, expected those by which the robot reads its arm"):
+        lapservo.run(robot, images, clock, with_shifted_joints(rig), lapservo.paper_trajectory(), 1)
+    with pytest.raises(lapservo.InputError, match="Ros2Robot: .*joints: is others, expected those by which the controller"):
+        lapservo.Ros2Robot("SIM_PSM1", with_shifted_joints(rig), lapservo.Controller(rig, joint_limits=LIMITS), clock)
 
 
 def test_the_wrist_of_the_rigs_tool_is_read(theatre, rig):
