@@ -25,6 +25,7 @@
 #include "python/src/conversions.h"
 #include "python/src/observed.h"
 #include "python/src/python_frames.h"
+#include "python/src/running.h"
 
 namespace lapservo::python {
 namespace {
@@ -294,12 +295,13 @@ struct Tick {
 
 class PythonObserver : public RunObserver {
  public:
-  PythonObserver(py::object on_tick, std::shared_ptr<const Rig> rig)
-      : on_tick_(std::move(on_tick)), rig_(std::move(rig)) {}
+  PythonObserver(py::object on_tick, std::shared_ptr<const Rig> rig, const Running& running)
+      : on_tick_(std::move(on_tick)), rig_(std::move(rig)), running_(running) {}
   // False ends the run; so does Ctrl-C.
   bool on_tick(const ControlTick& tick) override {
     const py::gil_scoped_acquire mine;
     if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+    if (running_.is_to_end()) return false;
     if (on_tick_.is_none()) return true;
     const py::object answer = on_tick_(Tick{tick, rig_});
     return answer.is_none() || answer.cast<bool>();
@@ -308,6 +310,7 @@ class PythonObserver : public RunObserver {
  private:
   py::object on_tick_;
   std::shared_ptr<const Rig> rig_;
+  const Running& running_;
 };
 
 // A member of the estimate for now; None without one.
@@ -395,7 +398,8 @@ void run_loop(Robot& robot, ImageStream& images, Clock& clock, const std::shared
   }
   config.tracking_thread = own_thread ? TrackingThread::own : TrackingThread::callers;
   if (config.controller.mode == ControlMode::paper) config.tracker.method = Method::centerline;
-  PythonObserver observer(std::move(on_tick), std::make_shared<const Rig>(config.rig));
+  const Running running(robot, images);
+  PythonObserver observer(std::move(on_tick), std::make_shared<const Rig>(config.rig), running);
   const py::gil_scoped_release others_run;
   run(robot, images, clock, config, trajectory, duration_s, observer);
 }
@@ -433,7 +437,8 @@ Where Robot.is_simulated() is False, the controller needs joint_limits.
 rcm_px: float[2], the RCM's image in ideal pixels, for mode 'uncalibrated' only, which uses no camera_from_rcm but for
 the default of rcm_px.
 own_thread: vision in a thread of its own, so that setpoints never wait for it (for real arms). on_tick(ControlTick) may
-return False, which ends the run. However it ends, the arm brakes to rest.
+return False, which ends the run. However it ends, also by Ctrl-C, SIGTERM or SIGHUP, the arm brakes to rest. A run in
+another thread than the main one ends with the main thread, not by Ctrl-C. One robot or camera is in one run at a time.
 
 InputError before anything moves: a trajectory that no image shows or that, with camera_from_rcm, can't be followed from
 the arm's joints by reach, limits or the image's window; missing joint_limits; joints or images ahead of the clock.)");

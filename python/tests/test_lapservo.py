@@ -1,12 +1,14 @@
 import pickle
 import re
 import signal
+import subprocess
+import sys
 import threading
 import time
 
 import numpy as np
 import pytest
-from conftest import Q
+from conftest import Q, SOURCE
 
 import lapservo
 
@@ -253,7 +255,8 @@ def test_ports_in_python_do_what_the_simulators_do(rig):
 
 def test_a_port_whose_overrides_nobody_calls_has_no_subclasses():
     ports = lapservo.Robot, lapservo.ImageStream, lapservo.Clock
-    made = [thing for thing in vars(lapservo).values() if isinstance(thing, type) and issubclass(thing, ports) and thing not in ports]
+    made = [thing for thing in vars(lapservo).values()
+            if isinstance(thing, type) and issubclass(thing, ports) and thing not in ports]
     assert len(made) in (2, 4)  # without ROS 2, with it
     for each in made:
         with pytest.raises(TypeError, match=rf"subclass of {each.__name__}: subclass .*, and pass calls on to a {each.__name__}"):
@@ -401,3 +404,55 @@ def test_a_controller_steers_the_rig_of_which_it_is_made(rig):
         with pytest.raises(lapservo.InputError) as caught:
             lapservo.run(simulator, simulator, simulator, other, lapservo.paper_trajectory(), 1, controller=controller)
         assert caught.value.source == "run" and caught.value.field == field
+
+
+def test_a_robot_and_a_camera_are_in_one_run_at_a_time(rig):
+    simulator, other, goal = lapservo.Simulator(rig, Q), lapservo.Simulator(rig, Q), lapservo.paper_trajectory()
+
+    def on_tick(tick):
+        for robot, images, field in ((simulator, other, "robot"), (other, simulator, "images")):
+            with pytest.raises(lapservo.InputError, match=f"run: {field}: is in another run"):
+                lapservo.run(robot, images, other, rig, goal, 1)
+        return False
+
+    for _ in range(2):
+        lapservo.run(simulator, simulator, simulator, rig, goal, 1, on_tick=on_tick)
+
+
+SCRIPT = """
+from test_lapservo import *
+
+class Announced(Arm):
+    def release(self):
+        print("released", flush=True)
+
+rig, moving = lapservo.Rig.load(SOURCE / "configs" / "paper.yaml"), threading.Event()
+simulator = lapservo.Simulator(rig, Q)
+signal.signal(signal.SIGHUP, signal.SIG_DFL)  # also under nohup
+
+def on_tick(tick):
+    if tick.sent and not moving.is_set():
+        print("moving", flush=True)
+        moving.set()
+
+def go():
+    goal = lapservo.set_point(lapservo.Kinematics(rig).features(Q))
+    lapservo.run(Announced(simulator), simulator, simulator, rig, goal, 600, on_tick=on_tick)
+
+"""
+
+
+@pytest.mark.parametrize(("ending", "sent", "code"), [
+    ("go()", signal.SIGTERM, -signal.SIGTERM),
+    ("go()", signal.SIGHUP, -signal.SIGHUP),
+    ("threading.Thread(target=go).start(); threading.Event().wait()", signal.SIGTERM, -signal.SIGTERM),
+    ("threading.Thread(target=go).start(); moving.wait()", None, 0),
+    ("threading.Thread(target=go, daemon=True).start(); moving.wait()", None, 0),
+])
+def test_every_end_of_the_process_brakes_first(ending, sent, code):
+    process = subprocess.Popen([sys.executable, "-c", SCRIPT + ending], cwd=SOURCE / "python" / "tests",
+                               stdout=subprocess.PIPE, text=True)
+    assert process.stdout.readline() == "moving\n"
+    if sent:
+        process.send_signal(sent)
+    assert process.communicate(timeout=120)[0] == "released\n" and process.returncode == code
