@@ -120,6 +120,11 @@ JointState CrtkRobot::latest() const {
   return interlock_.latest(clock_.now_s());
 }
 
+std::vector<JointReading> CrtkRobot::latest_readings() const {
+  const std::lock_guard lock(mutex_);
+  return interlock_.latest_readings();
+}
+
 std::vector<JointReading> CrtkRobot::readings() {
   const std::lock_guard lock(mutex_);
   return interlock_.take_readings();

@@ -33,6 +33,8 @@ class CrtkRobot : public Robot {
 
   /// For onlookers, in any thread: what state() has to report stays noted.
   JointState latest() const;
+  /// For onlookers, in any thread: what readings() has to give stays.
+  std::vector<JointReading> latest_readings() const;
   InterlockCounts counts() const;
   std::optional<Eigen::Vector4d> set_point() const;
   /// "real-time priority and locked memory", or the part of them that the system did not grant for setpoints.

@@ -93,6 +93,8 @@ class Interlock {
   JointState latest(double now_s) const;
   /// Robot::readings.
   std::vector<JointReading> take_readings() { return readings_.take(); }
+  /// The same for onlookers: they stay for take_readings().
+  std::vector<JointReading> latest_readings() const { return readings_.all(); }
   /// Call it every period: the setpoint of all the arm's joints to send now, if any.
   std::optional<std::vector<double>> tick(double now_s);
 

@@ -149,6 +149,7 @@ TEST(Interlock, TellsEveryReadingOnce) {
   bench.interlock.take_readings();
   for (const double passed_s : {0.1, 1100 * joints_period_s}) {
     bench.pass(passed_s);
+    EXPECT_FALSE(bench.interlock.latest_readings().empty());  // takes none
     const auto readings = bench.interlock.take_readings();
     const double arrived = passed_s / joints_period_s;
     ASSERT_NEAR(static_cast<double>(readings.size()), std::min(arrived, 1000.0), arrived < 1000 ? 1 : 0);

@@ -17,6 +17,7 @@ class ReadingBuffer {
     if (readings_.size() == max_readings) readings_.pop_front();
     readings_.push_back(reading);
   }
+  std::vector<JointReading> all() const { return {readings_.begin(), readings_.end()}; }
   std::vector<JointReading> take() {
     const std::deque<JointReading> taken = std::exchange(readings_, {});
     return {taken.begin(), taken.end()};

@@ -1,10 +1,15 @@
 #pragma once
 
 #include <optional>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Core>
 
 #include "lapservo/control/controller_config.h"
 #include "lapservo/core/error.h"
 #include "lapservo/rig/rig.h"
+#include "lapservo/robot/robot.h"
 
 namespace lapservo::python {
 
@@ -33,5 +38,12 @@ struct ArmOf {
 
 /// Whether this thread's call is the loop's, passed on by a robot in Python; else it is an onlooker's.
 inline thread_local bool loop_asks = false;
+
+/// Readings as Python has them.
+inline std::vector<std::pair<double, Eigen::Vector4d>> pairs_of(const std::vector<JointReading>& readings) {
+  std::vector<std::pair<double, Eigen::Vector4d>> pairs;
+  for (const JointReading& reading : readings) pairs.emplace_back(reading.time_s, reading.q.vector());
+  return pairs;
+}
 
 }  // namespace lapservo::python

@@ -134,7 +134,15 @@ is sent.)");
       .def(
           "state", [](Ros2Robot& self) { return unlocked([&] { return loop_asks ? self.state() : self.latest(); }); },
           "JointState as it is now, in any thread. A short fault is reported to run() alone, also through the state() "
-          "of a Robot that passes this one's on.");
+          "of a Robot that passes this one's on.")
+      .def(
+          "readings",
+          [](Ros2Robot& self) {
+            return pairs_of(unlocked([&] { return loop_asks ? self.readings() : self.latest_readings(); }));
+          },
+          "list of (time_s, float[4]): all since run() took them last, the newest 1000, in any thread. They stay for "
+          "run(), "
+          "also through the readings() of a Robot that passes this one's on.");
   refuse_subclasses(robot, "Robot");
   py::class_<Ros2Camera, ImageStream> camera(m, "Ros2Camera", "The newest image of a topic of ROS 2.");
   camera

@@ -51,16 +51,14 @@ py::sequence sequence_of(const py::object& given, std::size_t size, const char* 
 class PythonRobot : public Robot {
  public:
   JointState state() override {
-    const struct Asking {
-      bool before = std::exchange(loop_asks, true);
-      ~Asking() { loop_asks = before; }
-    } asking;
+    const Asking loop;
     PYBIND11_OVERRIDE_PURE(JointState, Robot, state);
   }
   std::vector<JointReading> readings() override {
     const py::gil_scoped_acquire mine;
     const py::function method = py::get_override(static_cast<const Robot*>(this), "readings");
     if (!method) return Robot::readings();
+    const Asking loop;
     using Time = Number<"Robot.readings()", Numbers::any>;
     using Reading = Array<"Robot.readings()", 4, 1, Numbers::any>;
     std::vector<JointReading> readings;
@@ -71,6 +69,12 @@ class PythonRobot : public Robot {
   void send(const JointPath& path) override { PYBIND11_OVERRIDE_PURE(void, Robot, send, path); }
   void release() override { PYBIND11_OVERRIDE(void, Robot, release); }
   bool is_simulated() const override { PYBIND11_OVERRIDE(bool, Robot, is_simulated); }
+
+ private:
+  struct Asking {
+    bool before = std::exchange(loop_asks, true);
+    ~Asking() { loop_asks = before; }
+  };
 };
 
 class PythonClock : public Clock {
@@ -145,13 +149,7 @@ own rate, and forgets it as soon as it is not enabled.)")
       .def(py::init<>())
       .def("state", &Robot::state, py::call_guard<py::gil_scoped_release>(), "JointState: the latest reading.")
       .def(
-          "readings",
-          [](Robot& self) {
-            const auto readings = unlocked([&] { return self.readings(); });
-            std::vector<std::pair<double, Eigen::Vector4d>> pairs;
-            for (const JointReading& reading : readings) pairs.emplace_back(reading.time_s, reading.q.vector());
-            return pairs;
-          },
+          "readings", [](Robot& self) { return pairs_of(unlocked([&] { return self.readings(); })); },
           "list of (time_s, float[4]): of the joints, all since the last call, for an arm that reads them more often "
           "than the loop calls it. May be left out.")
       .def("send", &Robot::send, py::arg("path"), py::call_guard<py::gil_scoped_release>(),

@@ -89,6 +89,9 @@ def test_an_onlooker_takes_nothing_from_the_loop(theatre, rig):
         def state(self):
             return robot.state()
 
+        def readings(self):
+            return robot.readings()
+
     def wait_for(read, blocked, meanwhile=lambda: None):
         while read().blocked != blocked:
             meanwhile()
@@ -100,6 +103,10 @@ def test_an_onlooker_takes_nothing_from_the_loop(theatre, rig):
     wait_for(robot.state, "second_source", lambda: other.publish(np.zeros(4), np.zeros(4)))
     wait_for(robot.state, "none")
     assert lapservo.Robot.state(loop).blocked == "second_source"
+    looked_at = [time_s for time_s, _ in robot.readings()]
+    taken = [time_s for time_s, _ in lapservo.Robot.readings(loop)]
+    assert len(looked_at) > 5 and set(looked_at[10:]) <= set(taken)  # the newest thousand
+    assert not set(taken) & {time_s for time_s, _ in lapservo.Robot.readings(loop)}
 
 
 def test_an_arm_is_moved_by_its_own_entry_of_the_rig_only(theatre, rig):
