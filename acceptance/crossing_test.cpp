@@ -249,28 +249,5 @@ TEST_F(Crossing, BothAreFollowed) {
   EXPECT_GE(sums.exact.found_of_those, 0.6 * sums.exact.tell);
 }
 
-bool both_are_ok(Tracker& tracker, const cv::Mat& frame) {
-  const auto& seen = tracker.track(frame);
-  return seen[0].status == Status::ok && seen[1].status == Status::ok;
-}
-
-// An instrument that emerges behind another while hidden markers are looked for, which takes many frames: soon after a
-// search of a whole frame would find it.
-TEST_F(Crossing, WhatEmergesIsFoundSoon) {
-  constexpr int frames = 60, soon = 10;
-  for (const std::uint64_t number : {1'041'005, 2'041'005}) {
-    Pair pair(rig, kinds()[number / 1'000'000 - 1], number);
-    Tracker whole(rig, {.single = true}), tracker(rig);
-    std::optional<int> shows, found;
-    for (int i = 0; i < frames && !found; ++i, pair.move()) {
-      const cv::Mat frame = pair.frame();
-      if (!shows && both_are_ok(whole, frame)) shows = i;
-      if (both_are_ok(tracker, frame)) found = i;
-    }
-    ASSERT_TRUE(found) << number;
-    EXPECT_LE(*found - shows.value_or(*found), soon) << number << " was found in frame " << *found;
-  }
-}
-
 }  // namespace
 }  // namespace lapservo::acceptance
