@@ -6,7 +6,6 @@
 
 #include <gtest/gtest.h>
 
-#include "lapservo/core/random.h"
 #include "lapservo/io/pictures/png_picture.h"
 
 namespace lapservo::internal {
@@ -175,23 +174,6 @@ TEST(ImageDecoder, RefusesWithTheReason) {
   EXPECT_EQ(why(decode(message)), "14 bytes with a step of 7 for 4x2 nv12");
   message.height = 3;
   EXPECT_EQ(why(decode(message)), "size 4x3");
-}
-
-TEST(ImageDecoder, WhateverTheFieldsHoldItAnswers) {
-  Random random(1);
-  const auto number = [&] { return static_cast<std::uint32_t>(std::abs(random.normal()) * 8); };
-  const std::array words{"bgr8", "rgb16", "yuv422", "nv12", "bayer_rggb8", "bayer_gbrg16", "mono8", ""};
-  for (int k = 0; k < 3000; ++k) {
-    ImageMessage message;
-    message.width = number(), message.height = number(), message.step = number() * 4;
-    message.encoding = words[k % words.size()];
-    message.data.resize(number() * number() * 4);
-    const DecodedImage image = decode(message);
-    if (const auto* bgr = std::get_if<cv::Mat>(&image)) {
-      EXPECT_EQ(bgr->type(), CV_8UC3);
-      EXPECT_EQ(bgr->cols, static_cast<int>(message.width));
-    }
-  }
 }
 
 TEST(ImageDecoder, CompressedImages) {

@@ -206,12 +206,6 @@ TEST(Interlock, AWristThatTheArmRoundsStaysWhereItWas) {
   EXPECT_EQ(bench.last_wrist, before);
 }
 
-TEST(Interlock, ReportsTheWristOfTheTool) {
-  Bench bench(config_of(true, {"outer_wrist"}));
-  bench.pass(0.1);
-  EXPECT_EQ(bench.interlock.state(bench.now_s).wrist_rad, std::vector<double>{bench.wrist});
-}
-
 TEST(Interlock, NoStepExceedsTheRateLimitWhateverThePathDoes) {
   Bench bench;  // pass() checks every step
   bench.control(0.1, slow);

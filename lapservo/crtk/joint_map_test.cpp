@@ -4,8 +4,6 @@
 
 #include <gtest/gtest.h>
 
-#include "lapservo/core/random.h"
-
 namespace lapservo::internal {
 namespace joint_map_test {
 
@@ -13,14 +11,6 @@ constexpr double half_pi = std::numbers::pi / 2;
 
 Joints psm() {
   return {{"outer_yaw", "outer_pitch", "outer_insertion", "outer_roll"}, {1, -1, 1, 1}, {0, half_pi, -0.0156, 0}};
-}
-
-TEST(JointMap, GoesThereAndBack) {
-  Random random(1);
-  for (int k = 0; k < 100; ++k) {
-    const Eigen::Vector4d q(random.normal(), random.normal(), random.normal(), random.normal());
-    EXPECT_TRUE(q_from_joints(psm(), joints_from_q(psm(), q)).isApprox(q, 1e-12));
-  }
 }
 
 TEST(JointMap, LimitsOfAReversedJointChangePlaces) {
