@@ -65,14 +65,4 @@ TEST(Cylinder, ACameraInsideTheShaftSeesNothing) {
   EXPECT_TRUE(view_cylinder(along_the_view, 0.0039));
 }
 
-TEST(Rigid3, InverseAndProductFormAGroup) {
-  testing::SeededRandom random(seed);
-  for (int i = 0; i < 100; ++i) {
-    const Rigid3 a_from_b = random_shaft(random), b_from_c = random_shaft(random);
-    const Eigen::Vector3d point(random.normal(), random.normal(), random.normal());
-    EXPECT_LT(((a_from_b * b_from_c) * point - a_from_b * (b_from_c * point)).norm(), 1e-12);
-    EXPECT_LT((a_from_b.inverse() * (a_from_b * point) - point).norm(), 1e-12);
-  }
-}
-
 }  // namespace lapservo::internal::cylinder_test

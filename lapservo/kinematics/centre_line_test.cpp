@@ -3,7 +3,6 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <filesystem>
 #include <optional>
 #include <string>
 
@@ -11,7 +10,6 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/core/angles.h"
-#include "lapservo/core/csv.h"
 #include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/rig/instruments.h"
 #include "lapservo/rig/rig.h"
@@ -20,7 +18,6 @@
 
 namespace lapservo::internal {
 namespace {
-namespace fs = std::filesystem;
 
 constexpr std::uint64_t seed = 41;
 

@@ -144,13 +144,6 @@ TEST(CrossRatioDecoder, InvertsADesignWhoseFirstBoundaryIsACircle) {
     for (const double tau_rad : turn_from_seam_to_seam()) ASSERT_NEAR(round_trip_rad(marker, tau_rad), tau_rad, 1e-10);
 }
 
-// Before the seam one turn ends, behind it the next one begins.
-TEST(CrossRatioDecoder, SeesTheSeamAsAWholeTurn) {
-  EXPECT_NEAR(round_trip_rad(falling, -0.01), two_pi - 0.01, 1e-10);
-  EXPECT_NEAR(round_trip_rad(falling, 0.01), 0.01, 1e-10);
-  EXPECT_NEAR(round_trip_rad(falling, two_pi + 0.01), 0.01, 1e-10);
-}
-
 TEST(CrossRatioDecoder, BeyondTheRangeGivesTheNearerEnd) {
   const Marker rising = marker_with({0.0095, 0.0095, 0.005}, {0.0035, 0.0035, 0.017});
   for (const auto& [marker, at_lowest, at_highest] :

@@ -68,27 +68,6 @@ TEST(ProjectedRcm, IsExactWithoutNoise) {
   }
 }
 
-TEST(ProjectedRcm, FollowsASimilarity) {
-  testing::SeededRandom random(72);
-  for (int trial = 0; trial < 30; ++trial) {
-    const Lines lines = with_errors(uneven_lines({-300, 200}, 15, random), 1, random);
-    const Eigen::Matrix2d a = random.uniform(0.2, 4) * Eigen::Rotation2Dd(random.uniform(-pi, pi)).toRotationMatrix();
-    const Eigen::Vector2d b(random.uniform(-900, 900), random.uniform(-900, 900));
-    Eigen::Matrix4d both = Eigen::Matrix4d::Zero();
-    both.topLeftCorner<2, 2>() = both.bottomRightCorner<2, 2>() = a;
-    Lines moved = lines;
-    for (LineObservation& line : moved)
-      line = {a * line.from_px + b, a * line.to_px + b, both * line.covariance_px2 * both.transpose()};
-    const auto here = estimate_projected_rcm(lines, {NoiseScale::known}),
-               there = estimate_projected_rcm(moved, {NoiseScale::known});
-    EXPECT_LT((there.point_px - (a * here.point_px + b)).norm(), 1e-5);
-    EXPECT_LT((*there.covariance_px2 - a * *here.covariance_px2 * a.transpose()).norm(),
-              1e-5 * there.covariance_px2->norm());
-    EXPECT_NEAR(there.chi2, here.chi2, 1e-6 * here.chi2);
-    EXPECT_NEAR(there.direction_spread_rad, here.direction_spread_rad, 1e-9);
-  }
-}
-
 TEST(ProjectedRcm, CovarianceIsHonest) {
   testing::SeededRandom random(75);
   const Eigen::Vector2d truth(-120, -240);
