@@ -11,8 +11,6 @@
 #include "lapservo/core/random.h"
 #include "lapservo/kinematics/centre_line.h"
 #include "lapservo/kinematics/rcm_kinematics.h"
-#include "lapservo/sim/shaft_lighting.h"
-#include "lapservo/sim/shaft_tracer.h"
 #include "lapservo/sim/test_edge_probe.h"
 #include "lapservo/sim/tissue.h"
 
@@ -246,20 +244,6 @@ TEST(Renderer, AToolHidesTheMarkerOnlyWhereItIsInFrontOfIt) {
     };
     EXPECT_GT(over_marker(1), 30) << trial;
     EXPECT_EQ(over_marker(-1), 0) << trial;
-  }
-}
-
-TEST(Lighting, TurnedDownLampsLeaveTheAmbientPart) {
-  Lighting full;
-  full.ambient = 0.05F;
-  const ShaftTracer tracer(short_shaft(), across_the_view(0.2, 0));
-  const ShaftLighting bright(full, tracer), dim(at_power(full, 0.4F), tracer);
-  for (const float azimuth_rad : {-1.2F, 0.0F, 0.7F}) {
-    const Eigen::Vector3f normal(std::cos(azimuth_rad), std::sin(azimuth_rad), 0);
-    const Eigen::Vector3f point = tracer.radius_m() * normal + Eigen::Vector3f(0, 0, 0.01F);
-    const Lit a = bright.at(point, normal), b = dim.at(point, normal);
-    EXPECT_NEAR(b.matt - 0.05F, 0.4F * (a.matt - 0.05F), 1e-6) << azimuth_rad;
-    EXPECT_NEAR(b.gloss, 0.4F * a.gloss, 1e-6) << azimuth_rad;
   }
 }
 
