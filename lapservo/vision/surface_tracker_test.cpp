@@ -95,20 +95,6 @@ std::vector<JointVector> slow_motion(const Rig& rig, std::uint64_t seed, int fra
   return motion;
 }
 
-TEST(SurfaceTracker, FollowingTellsTheSameAsLookingAnew) {
-  const Rig rig = scenes::usual_rig();
-  SurfaceTracker following(rig, {.frame_budget = {}}), anew(rig, {.single = true});
-  const auto motion = slow_motion(rig, 4, 8);
-  for (std::size_t i = 0; i < motion.size(); ++i) {
-    SCOPED_TRACE("seed 4, frame " + std::to_string(i));
-    const cv::Mat image = scenes::render(rig, {motion[i]}, i);
-    const Observation followed = following.track(image)[0], found = anew.track(image)[0];
-    expect_right(followed, motion[i]);
-    expect_right(found, motion[i]);
-    EXPECT_LT(normalised_square(found, followed.rcm->q), 0.05);
-  }
-}
-
 // A defocused image can't show that the camera sharpens, and the next one may start from its blur: they are less sure
 // then, and those that follow are corrected again.
 TEST(SurfaceTracker, RemembersThatTheCameraSharpens) {
@@ -152,20 +138,13 @@ TEST(SurfaceTracker, NoticesAtOnceThatTheCameraSharpens) {
   }
 }
 
-TEST(SurfaceTracker, FindsTheInstrumentAgainAfterItWasHidden) {
+TEST(SurfaceTracker, FindsAnInstrumentThatJumps) {
   const Rig rig = scenes::usual_rig();
-  const cv::Mat hidden = scenes::render_nothing(rig, 2);
   SurfaceTracker tracker(rig, {.frame_budget = {}});
-  const auto expect_seen = [&](const Shot& shot) { expect_right(tracker.track(shot.bgr)[0], shot.q); };
-  for (std::uint64_t seed = 1; seed <= 6; seed += 2) {
+  for (const std::uint64_t seed : {2, 1, 4, 3, 6, 5}) {
     SCOPED_TRACE("seed " + std::to_string(seed));
-    const Shot &before = usual_shot(seed), &after = usual_shot(seed + 1);
-    expect_seen(before);
-    for (int i = 0; i < 3; ++i) EXPECT_EQ(tracker.track(hidden)[0].status, Status::no_marker);
-    expect_seen(after);
-    expect_seen(before);  // a jump without a gap
-    tracker.forget();
-    expect_seen(after);
+    if (seed % 2 == 0) tracker.forget();
+    expect_right(tracker.track(usual_shot(seed).bgr)[0], usual_shot(seed).q);
   }
 }
 

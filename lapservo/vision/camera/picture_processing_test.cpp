@@ -189,24 +189,6 @@ TEST(PooledEdges, LeaveOutWhatLiesElsewhere) {
   EXPECT_EQ(edges.of_measurement[4], PooledEdges::nowhere);
 }
 
-// The exactly linear part.
-TEST(PooledEdges, SampleBetweenPixels) {
-  cv::Mat bgr(40, 60, CV_8UC3);
-  for (int v = 0; v < bgr.rows; ++v)
-    for (int u = 0; u < bgr.cols; ++u)
-      bgr.at<cv::Vec3b>(v, u) = cv::Vec3b(static_cast<std::uint8_t>(2 * u + v), static_cast<std::uint8_t>(3 * v), 7);
-  const ImageView view(bgr);
-  const LightImage light(view, srgb());
-  const std::vector<Measurement> measurements(8, measured_at({25.3F, 18.6F}, {0.6F, 0.8F}));
-  for (const Look look : {Look::glance, Look::closely})
-    for (int i = 0; i < PooledEdge::samples; ++i) {
-      const PooledEdge edge = pool_edges(light, measurements, look).all[0];
-      const float t = static_cast<float>(i - PooledEdge::reach), u = 25.3F + 0.6F * t, v = 18.6F + 0.8F * t;
-      EXPECT_NEAR(255 * edge.value[0][static_cast<std::size_t>(i)], 2 * u + v, 1e-3);
-      EXPECT_NEAR(255 * edge.value[1][static_cast<std::size_t>(i)], 3 * v, 1e-3);
-    }
-}
-
 // A blurred step of light, encoded, so far on its bright side.
 double encoded_step(double distance_px) {
   constexpr double blur_px = 0.8;
