@@ -129,23 +129,6 @@ TEST_F(Ros1Wire, KnowsWhoReads) {
   EXPECT_TRUE(become({"/peer"}));
 }
 
-TEST_F(Ros1Wire, HearsOthersOnItsOwnTopicButNotItself) {
-  TestInbox<JointMessage> heard;
-  const auto subscription = transport_->subscribe<JointMessage>("/out/joints", heard.handler());
-  const auto say = transport_->publisher<JointMessage>("/out/joints"),
-             ask = transport_->publisher<JointMessage>("/in/joints");
-  heard.get([&] {
-    say({stamp_s, {}, {1}});
-    ask({stamp_s, {}, {2}});
-  });
-  for (int i = 0; i < 20; ++i) {
-    say({stamp_s, {}, {1}});
-    ask({stamp_s, {}, {3}});
-  }
-  ASSERT_TRUE(wait_for([&] { return heard.count() > 10; }));
-  for (const JointMessage& message : heard.all()) EXPECT_NE(message.positions, std::vector<double>{1});
-}
-
 TEST_F(Ros1Wire, HearsCommandsOfAnyTypeButNotItself) {
   TestInbox<CommandMessage> joints, trajectories, own;
   const auto nothing = CommandType::nothing;

@@ -257,30 +257,6 @@ TEST(Ros2Transport, CommandsAreHeardWhateverTheSendersClockSays) {
   }
 }
 
-// Their fields: WireBytes.
-TEST(Ros2Transport, WhatItTellsOfTheLoopArrivesAsItsType) {
-  Ros2Transport from("from");
-  DdsNode to("to", test_domain());
-  const auto arrives = [&]<typename Message>(const std::string& topic, const Transport::Publisher<Message>& say) {
-    const dds_entity_t reader = to.create_reader(topic, Wire<Message>::descriptor(), Delivery::reliable);
-    return testing::wait_for([&] {
-      void* sample = nullptr;
-      dds_sample_info_t info;
-      say(Message{});
-      const bool taken = dds_take(reader, &sample, &info, 1, 1) > 0;
-      if (taken) dds_return_loan(reader, &sample, 1);
-      return taken;
-    });
-  };
-  EXPECT_TRUE(arrives("/pose", from.publisher<PoseMessage>("/pose")));
-  EXPECT_TRUE(arrives("/tf", from.publisher<TransformsMessage>("/tf")));
-  EXPECT_TRUE(arrives("/tf_static", from.publisher<StaticTransformsMessage>("/tf_static")));
-  EXPECT_TRUE(arrives("/markers", from.publisher<CylindersMessage>("/markers")));
-  EXPECT_TRUE(arrives("/diagnostics", from.publisher<DiagnosticMessage>("/diagnostics")));
-  EXPECT_TRUE(arrives("/seen", from.publisher<ObservationMessage>("/seen")));
-  EXPECT_TRUE(arrives("/camera_info", from.publisher<CameraInfoMessage>("/camera_info")));
-}
-
 TEST(Ros2Transport, AStampThatIsNoneIsNotANumber) {
   sensor_msgs_msg_dds__JointState_ wire{};
   wire.header.stamp = {5, 1000000000u};
