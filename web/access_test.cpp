@@ -70,27 +70,6 @@ TEST(Access, AsksStrangersForTheToken) {
   EXPECT_EQ(status(access, first), 403);
 }
 
-// A browser has one set of cookies a host, whatever the port.
-TEST(Access, KeepsTheTokensOfTwoPagesApart) {
-  for (const std::string host : {"192.168.1.2", "[fe80::1]", "localhost"}) {
-    const std::string tokens[] = {random_token(), random_token(), random_token()};
-    const Access pages[] = {{false, tokens[0]}, {false, tokens[1]}, {false, tokens[2]}};
-    const std::string hosts[] = {host + ":8080", host + ":8081", host};
-    std::map<std::string, std::string> cookies;
-    for (int i = 0; i < 3; ++i) {
-      HttpRequest first = request("GET", "/", {{"host", hosts[i]}});
-      first.query = {{"token", tokens[i]}};
-      const std::string set = pages[i].refuse(first).value().headers.back().second;
-      cookies[set.substr(0, set.find('='))] = set.substr(set.find('=') + 1, tokens[i].size());
-    }
-    for (int i = 0; i < 3; ++i) {
-      HttpRequest asked = request("GET", "/state", {{"host", hosts[i]}});
-      asked.cookies = cookies;
-      EXPECT_EQ(status(pages[i], asked), 200) << hosts[i];
-    }
-  }
-}
-
 // The address that lapservo prints, followed from a notebook, a terminal in a browser, a wiki.
 TEST(Access, LetsALinkToThePageThrough) {
   const Access access(true, "");
