@@ -59,7 +59,11 @@ TEST(MotionLimits, AreNeverCrossedWhateverIsWanted) {
         weight = root * root.transpose() + 0.01 * Eigen::Matrix4d::Identity();
       }
       const MotionState before = path.end();
-      const auto next = limit_velocity(limits, window, before, camera.at(before.position), wanted, weight, period_s);
+      const Eigen::Vector4d rate = (k < 300 ? 1 : 0.1) * limits.rate;  // slow from then on, after a motion at any speed
+      const auto next =
+          limit_velocity(limits, window, before, camera.at(before.position), wanted, weight, period_s, rate);
+      const Eigen::Vector4d most = rate.cwiseMax(brake(limits, before.velocity, period_s).cwiseAbs());
+      ASSERT_LE((next.velocity.cwiseAbs() - most).maxCoeff(), 1e-9);
       const Eigen::Vector4d acceleration = (next.velocity - before.velocity) / period_s;
       ASSERT_LE((acceleration.cwiseAbs() - limits.acceleration).maxCoeff(), 1e-9);
       path.ramp_to(k * period_s, next.velocity, period_s);

@@ -266,7 +266,7 @@ void VisualController::limit(const Law& law, const Eigen::Vector4d& q_joint, Con
   }
   wanted = following_error_limit_.apply(motion.velocity, wanted, config_.period_s);
   const auto limited =
-      limit_velocity(config_.limits, config_.window, motion, ends, wanted, law.weight, config_.period_s);
+      limit_velocity(config_.limits, config_.window, motion, ends, wanted, law.weight, config_.period_s, law.rate);
   if (!limited.velocity.allFinite()) {
     step.reason = HoldReason::non_finite;
     return;

@@ -238,6 +238,27 @@ TEST(VisualController, SendsNothingBeforeTheFirstMeasuredJoints) {
   EXPECT_EQ(first.setpoint.position, q);
 }
 
+// Nor do those that make up in the image for a joint at its limit; the first image of a motion is later than all this.
+TEST(VisualController, NoJointIsFasterThanImagesHaveConfirmed) {
+  const TestRig rig;
+  Flaws flaws = usual_flaws();
+  flaws.latency_s = 0.25;
+  double fastest = 0;
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    ControllerConfig config = testing::test_config(flaws);
+    Random random(seed);
+    const Eigen::Vector4d start = testing::random_start(rig, config, flaws, random),
+                          rate = ImageResponse::unconfirmed_rate(config.limits);
+    config.limits.lower[2] = start[2];
+    const Eigen::Vector4d beyond = start + flaws.offset - 0.01 * Eigen::Vector4d::UnitZ();
+    VisualController controller(config, testing::model_of(rig));
+    TestSimulator simulator(rig, flaws, start, seed);
+    for (const Moment& m : simulator.run(controller, set_point(exact_map(rig, beyond).value().features), 0.5))
+      fastest = std::max(fastest, m.step.velocity.cwiseAbs().cwiseQuotient(rate).maxCoeff());
+  }
+  EXPECT_NEAR(fastest, 1, 1e-9);
+}
+
 TestRig wrong_rig(Random& random) {
   TestRig rig;
   const double focal = random.uniform(0.8, 1.2);
