@@ -151,8 +151,8 @@ void sum_up(TrackingRun& run) {
     run.steady_largest = run.steady_largest.cwiseMax(error.cwiseAbs());
     ++counted;
   }
-  run.converged_s = convergence.reached_s();
-  if (run.scenario.hidden_to_s && again.reached_s()) run.back_s = *again.reached_s() - *run.scenario.hidden_to_s;
+  run.converged_s = convergence.first_s();
+  if (run.scenario.hidden_to_s && again.first_s()) run.back_s = *again.first_s() - *run.scenario.hidden_to_s;
   run.steady_rms = (run.steady_rms / std::max(1.0, counted)).cwiseSqrt();
   run.steady_mean /= std::max(1.0, counted);
   for (int i = 0; i < 4; ++i) run.decay_per_s[i] = decay_per_s(run, i).value_or(NAN);

@@ -30,7 +30,7 @@ struct TrackingScenario {
 struct TrackingRun {
   TrackingScenario scenario;
   TimeTable table;                    ///< what tracking_ID.csv holds
-  std::optional<double> converged_s;  ///< true errors get within 1 px and 5 mrad and stay there for a second
+  std::optional<double> converged_s;  ///< from when on true errors are first within 1 px and 5 mrad for a second
   /// True errors s_rad, r, l, d px over the last third, or from the hidden marker's return on.
   Eigen::Vector4d steady_rms = Eigen::Vector4d::Zero(), steady_mean = Eigen::Vector4d::Zero(),
                   steady_largest = Eigen::Vector4d::Zero();

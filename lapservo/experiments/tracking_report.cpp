@@ -145,7 +145,7 @@ std::vector<Comparison> comparisons(const TrackingResult& result, const Eigen::V
       {"tracking: rms of the errors over the last third", "figure 7: \u201cconverge to zero\u201d",
        text_of(result, "paper", rms), text_of(result, "default", rms)},
       {"the paper\u2019s law with our tracker", "", "", text_of(result, "paper_surface", rms)},
-      {"within 1 px and 5 mrad", "", text_of(result, "paper", converged_text),
+      {"first within 1 px and 5 mrad for a second", "", text_of(result, "paper", converged_text),
        text_of(result, "default", converged_text)},
       {"decay of the errors of s, r, l, d by the paper\u2019s law", "K = " + decays_text(gains_per_s) + " (eq. 22)",
        text_of(result, "paper", decay), text_of(result, "paper_surface", with_our_tracker)},
@@ -175,7 +175,7 @@ std::vector<Figure> figures(const TrackingResult& result) {
   if (const TrackingRun* hidden = run_of(result, "hidden"))
     figures.push_back(
         {errors(*hidden),
-         fmt::format("Between {:.0f} and {:.0f} s nothing is seen: the arm holds, the desired features move on.",
+         fmt::format("Between {:.0f} and {:.0f} s nothing is seen: the arm holds, and the desired features stand.",
                      hidden->scenario.hidden_from_s.value_or(0), hidden->scenario.hidden_to_s.value_or(0))});
   return figures;
 }

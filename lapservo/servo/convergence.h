@@ -7,39 +7,49 @@
 
 namespace lapservo::internal {
 
-/// Watches the errors s_rad, r_px, l_px, d_px of a run: converged when all are within 5 mrad and 1 px for a second.
+/// Watches the errors s_rad, r_px, l_px, d_px of a run: converged while all have been within 5 mrad and 1 px for a
+/// second and longer, holds of the loop aside. Errors that leave the bounds end it, until it converges again.
 class Convergence {
  public:
-  /// `held`: the loop held the arm; from convergence on such errors are counted, and not part of the RMS.
+  /// `held`: the loop held the arm; from convergence on such errors end nothing, and are no part of the RMS.
   void add(double time_s, const Eigen::Vector4d& error, bool held = false) {
     const bool within = std::abs(error[0]) <= close_rad && error.tail<3>().cwiseAbs().maxCoeff() <= close_px;
-    if (!reached_ && !within) close_ = false, squares_.setZero(), count_ = 0;
-    if (!reached_ && within && !close_) close_ = true, since_s_ = time_s;
-    if (!close_) return;
+    if (!within && !(reached_ && held)) since_.reset(), reached_ = false;
+    if (within && !since_) since_ = Since{time_s};
+    if (!since_) return;
     if (reached_ && held) {
-      ++held_;
-      return;
+      ++since_->held;
+    } else {
+      since_->squares += error.cwiseAbs2();
+      ++since_->count;
+      reached_ = reached_ || time_s - since_->time_s >= for_s;
     }
-    squares_ += error.cwiseAbs2();
-    ++count_;
-    reached_ = reached_ || time_s - since_s_ >= for_s;
+    if (reached_ && !first_s_) first_s_ = since_->time_s;
   }
 
-  /// Start of the first such second.
-  std::optional<double> reached_s() const { return reached_ ? std::optional(since_s_) : std::nullopt; }
-  /// Errors in holds from then on.
-  long held_since() const { return held_; }
-  /// RMS of all other errors from then on; zero before.
+  /// Start of the first such second, whatever came after.
+  std::optional<double> first_s() const { return first_s_; }
+  /// Since when it is converged.
+  std::optional<double> reached_s() const { return reached_ ? std::optional(since_->time_s) : std::nullopt; }
+  /// Errors in holds since then.
+  long held_since() const { return reached_ ? since_->held : 0; }
+  /// RMS of all other errors since then; zero before.
   Eigen::Vector4d rms_since() const {
-    return reached_ ? Eigen::Vector4d((squares_ / static_cast<double>(count_)).cwiseSqrt()) : Eigen::Vector4d::Zero();
+    return reached_ ? Eigen::Vector4d((since_->squares / static_cast<double>(since_->count)).cwiseSqrt())
+                    : Eigen::Vector4d::Zero();
   }
 
  private:
   static constexpr double close_px = 1, close_rad = 5e-3, for_s = 1;
-  bool close_ = false, reached_ = false;
-  double since_s_ = 0;  ///< close
-  Eigen::Vector4d squares_ = Eigen::Vector4d::Zero();
-  long count_ = 0, held_ = 0;
+  /// All that is summed since the errors are within.
+  struct Since {
+    double time_s = 0;
+    Eigen::Vector4d squares = Eigen::Vector4d::Zero();
+    long count = 0, held = 0;
+  };
+  std::optional<Since> since_;
+  bool reached_ = false;
+  std::optional<double> first_s_;
 };
 
 }  // namespace lapservo::internal

@@ -26,12 +26,21 @@ TEST(Convergence, TakesAWholeSecondWithin) {
   EXPECT_LT((convergence.rms_since() - close.cwiseAbs()).norm(), 1e-12);
 }
 
-TEST(Convergence, CountsWhatComesAfter) {
+// An error that swings is small for a second at its turning point. In a hold nothing is left.
+TEST(Convergence, IsLeftAgain) {
   Convergence convergence;
-  for (int i = 0; i < 20; ++i) convergence.add(i * period_s, Eigen::Vector4d::Zero());
-  for (int i = 20; i < 40; ++i) convergence.add(i * period_s, {0, 3, 0, 0});
-  EXPECT_EQ(convergence.reached_s(), 0);
-  EXPECT_NEAR(convergence.rms_since()[1], 3 / std::sqrt(2), 1e-9);
+  const auto add = [&](int from, int to, double r_px, bool held = false) {
+    for (int i = from; i < to; ++i) convergence.add(i * period_s, {0, r_px, 0, 0}, held);
+    return convergence.reached_s();
+  };
+  EXPECT_EQ(add(0, 20, 0.5), 0);
+  EXPECT_EQ(add(20, 30, 3, true), 0);
+  EXPECT_FALSE(add(30, 31, 3));
+  EXPECT_FALSE(add(31, 40, 0.2));
+  EXPECT_EQ(add(40, 50, 0.2), 31 * period_s);
+  EXPECT_NEAR(convergence.rms_since()[1], 0.2, 1e-9);
+  EXPECT_EQ(convergence.held_since(), 0);
+  EXPECT_EQ(convergence.first_s(), 0);
 }
 
 }  // namespace

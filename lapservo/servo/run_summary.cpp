@@ -76,7 +76,12 @@ void RunSummary::add(const ControlTick& tick, const std::optional<InstrumentTrut
 
 std::string RunSummary::convergence_text() const {
   const auto reached_s = convergence_.reached_s();
-  if (!reached_s) return "not within 1 px and 5 mrad for a second";
+  if (!reached_s) {
+    const auto first_s = convergence_.first_s();
+    return first_s ? fmt::format("not within 1 px and 5 mrad for the last second, though from {:.2f} s on for a second",
+                                 *first_s)
+                   : "not within 1 px and 5 mrad for a second";
+  }
   const Eigen::Vector4d rms = convergence_.rms_since();
   const long held = convergence_.held_since();
   return fmt::format(

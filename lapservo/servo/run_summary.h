@@ -24,6 +24,7 @@ class RunSummary {
  public:
   /// By the truth, where it is known, else by the estimate. `block`: see block_of().
   void add(const ControlTick& tick, const std::optional<InstrumentTruth>& truth, const std::string& block = {});
+  /// Within 1 px and 5 mrad for the last second and longer, holds aside.
   bool converged() const { return convergence_.reached_s().has_value(); }
   /// Converged and not in a hold at the end; when `strict`, with a registration that no image contradicted.
   bool succeeded(bool strict) const { return converged() && !held_at_end_ && !(strict && registration_contradicted()); }

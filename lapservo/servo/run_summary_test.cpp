@@ -37,6 +37,10 @@ TEST_F(RunSummaryTest, CountsHoldsByTheirReasonOrTheArms) {
   add(ControlAction::hold, HoldReason::marker_lost, 1);
   EXPECT_TRUE(says("ended in a hold: marker_lost")) << summary.text();
   EXPECT_FALSE(summary.succeeded(false));
+  feature_error_rad = 0.5;
+  add(ControlAction::track, HoldReason::none, 1);
+  EXPECT_TRUE(says("not within 1 px and 5 mrad for the last second, though from 0.00 s on for a second"));
+  EXPECT_FALSE(summary.succeeded(false));
 }
 
 // A marker that is hidden for long is no error of what was tracked.
