@@ -70,8 +70,7 @@ void RunSummary::add(const ControlTick& tick, const std::optional<InstrumentTrut
     if (converged()) return;
     error.setConstant(std::numeric_limits<double>::infinity());  // not known, and so not small
   }
-  convergence_.add(tick.input.time_s - *start_s_, error, holds);
-  if (converged() && tick.tip_error_px) tip_squares_px2_ += tick.tip_error_px->squaredNorm(), ++tip_images_;
+  convergence_.add(tick.input.time_s - *start_s_, error, holds, tick.tip_error_px);
 }
 
 std::string RunSummary::convergence_text() const {
@@ -84,13 +83,11 @@ std::string RunSummary::convergence_text() const {
   }
   const Eigen::Vector4d rms = convergence_.rms_since();
   const long held = convergence_.held_since();
+  const auto tip_px = convergence_.tip_rms_px();
   return fmt::format(
       "within 1 px and 5 mrad from {:.2f} s on; rms since{}: s {:.2f} mrad, r {:.2f}, l {:.2f}, d {:.2f} px{}",
       *reached_s, held > 0 ? fmt::format(" while it tracked (held for {} ticks)", held) : "", 1000 * rms[0], rms[1],
-      rms[2], rms[3],
-      tip_images_ > 0 ? fmt::format("; the seen tip {:.2f} px from its goal",
-                                    std::sqrt(tip_squares_px2_ / static_cast<double>(tip_images_)))
-                      : "");
+      rms[2], rms[3], tip_px ? fmt::format("; the seen tip {:.2f} px from its goal", *tip_px) : "");
 }
 
 std::string RunSummary::holds_text() const {

@@ -47,8 +47,6 @@ class RunSummary {
   std::map<std::string, long> held_;
   std::optional<std::string> held_at_end_;  // by the last tick, and why
   Convergence convergence_;
-  double tip_squares_px2_ = 0;  ///< of the seen tip from its goal, since it converged
-  long tip_images_ = 0;
 };
 
 }  // namespace lapservo::internal

@@ -14,7 +14,7 @@ class RunSummaryTest : public ::testing::Test {
     tick.decision.control.action = action, tick.decision.control.reason = reason;
     tick.decision.registration_contradicted = contradicted;
     if ((tick.pursues_tip = tip_error_px.has_value())) tick.decision.control.estimate.emplace();
-    tick.tip_error_px = tip_error_px;
+    tick.tip_error_px = tip_error_px, tick.decision.camera_from_rcm = camera_from_rcm;
     InstrumentTruth truth;
     truth.features = feature_error_rad * Eigen::Vector4d::UnitX();
     for (int i = 0; i < count; ++i, time_s += period_s) tick.input.time_s = time_s, summary.add(tick, truth, block);
@@ -25,6 +25,7 @@ class RunSummaryTest : public ::testing::Test {
   double time_s = 0, feature_error_rad = 0;
   bool contradicted = false;
   std::optional<Eigen::Vector2d> tip_error_px;
+  std::optional<Rigid3> camera_from_rcm;
 };
 
 TEST_F(RunSummaryTest, CountsHoldsByTheirReasonOrTheArms) {
@@ -54,10 +55,16 @@ TEST_F(RunSummaryTest, ErrorsOfHoldsAreNoPartOfTheRms) {
   EXPECT_TRUE(says("rms since while it tracked (held for 30 ticks): s 0.00 mrad")) << summary.text();
 }
 
-// The true features differ from those that a wrong registration has for the tip's place.
+// Images of before the endoscope moved are no part of it. The true features differ from those that a wrong
+// registration has for the tip's place.
 TEST_F(RunSummaryTest, AGoalOfTheTipIsReachedByTheLoopsOwnError) {
-  tip_error_px = Eigen::Vector2d(0.3, 0.4);
   feature_error_rad = 0.5;
+  camera_from_rcm.emplace();
+  tip_error_px = Eigen::Vector2d(30, 40);
+  add(ControlAction::track, HoldReason::none, 15);
+  camera_from_rcm.reset();
+  add(ControlAction::hold, HoldReason::endoscope_moved, 1);
+  tip_error_px = Eigen::Vector2d(0.3, 0.4);
   add(ControlAction::track, HoldReason::none, 15);
   EXPECT_TRUE(says("s 0.00 mrad")) << summary.text();
   EXPECT_TRUE(says("the seen tip 0.50 px from its goal")) << summary.text();
