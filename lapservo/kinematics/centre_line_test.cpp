@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <filesystem>
 #include <optional>
 #include <string>
 
@@ -10,6 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/core/angles.h"
+#include "lapservo/core/csv.h"
 #include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/rig/instruments.h"
 #include "lapservo/rig/rig.h"
@@ -18,6 +20,7 @@
 
 namespace lapservo::internal {
 namespace {
+namespace fs = std::filesystem;
 
 constexpr std::uint64_t seed = 41;
 

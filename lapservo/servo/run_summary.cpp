@@ -64,7 +64,8 @@ void RunSummary::add(const ControlTick& tick, const std::optional<InstrumentTrut
   held_at_end_ = holds ? std::optional(blocked ? block : reason_text(tick.decision)) : std::nullopt;
   Eigen::Vector4d error = control.error;
   const bool by_truth = truth && !tick.pursues_tip;
-  if (by_truth && truth->features) {
+  by_estimate_ = !(by_truth && truth->features);
+  if (!by_estimate_) {
     error = feature_error(*truth->features, tick.input.desired.features);
   } else if (!by_truth && !(control.estimate && tick.input.desired.features.allFinite())) {
     if (converged()) return;
@@ -75,19 +76,22 @@ void RunSummary::add(const ControlTick& tick, const std::optional<InstrumentTrut
 
 std::string RunSummary::convergence_text() const {
   const auto reached_s = convergence_.reached_s();
+  const std::string by = by_estimate_ ? ", by the loop's own estimate" : "";
   if (!reached_s) {
     const auto first_s = convergence_.first_s();
-    return first_s ? fmt::format("not within 1 px and 5 mrad for the last second, though from {:.2f} s on for a second",
-                                 *first_s)
-                   : "not within 1 px and 5 mrad for a second";
+    return (first_s
+                ? fmt::format("not within 1 px and 5 mrad for the last second, though from {:.2f} s on for a second",
+                              *first_s)
+                : "not within 1 px and 5 mrad for a second") +
+           by;
   }
   const Eigen::Vector4d rms = convergence_.rms_since();
   const long held = convergence_.held_since();
   const auto tip_px = convergence_.tip_rms_px();
   return fmt::format(
-      "within 1 px and 5 mrad from {:.2f} s on; rms since{}: s {:.2f} mrad, r {:.2f}, l {:.2f}, d {:.2f} px{}",
+      "within 1 px and 5 mrad from {:.2f} s on; rms since{}: s {:.2f} mrad, r {:.2f}, l {:.2f}, d {:.2f} px{}{}",
       *reached_s, held > 0 ? fmt::format(" while it tracked (held for {} ticks)", held) : "", 1000 * rms[0], rms[1],
-      rms[2], rms[3], tip_px ? fmt::format("; the seen tip {:.2f} px from its goal", *tip_px) : "");
+      rms[2], rms[3], by, tip_px ? fmt::format("; the seen tip {:.2f} px from its goal", *tip_px) : "");
 }
 
 std::string RunSummary::holds_text() const {

@@ -22,7 +22,7 @@ std::string block_of(const Supervisor& arm);
 /// The results of the run, for the last lines.
 class RunSummary {
  public:
-  /// By the truth, where it is known, else by the estimate. `block`: see block_of().
+  /// By the truth, where it is known, else by the loop's own estimate, which text() says. `block`: see block_of().
   void add(const ControlTick& tick, const std::optional<InstrumentTruth>& truth, const std::string& block = {});
   /// Within 1 px and 5 mrad for the last second and longer, holds aside.
   bool converged() const { return convergence_.reached_s().has_value(); }
@@ -47,6 +47,7 @@ class RunSummary {
   std::map<std::string, long> held_;
   std::optional<std::string> held_at_end_;  // by the last tick, and why
   Convergence convergence_;
+  bool by_estimate_ = true;  ///< of the last tick's error
 };
 
 }  // namespace lapservo::internal
