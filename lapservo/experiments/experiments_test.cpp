@@ -91,6 +91,8 @@ TEST(Rotation, IsSummedUpByTrial) {
   }
   EXPECT_NEAR(of_method.all.mean, 0.45, 0.01);
   EXPECT_NEAR(of_method.under_100mrad, 0.15, 0.01) << "trial 0 and half of trial 1";
+  const std::string from_trial_to_trial = section_of(RotationResult{{of_method}}, {}).comparisons[0].surface;
+  EXPECT_FALSE(from_trial_to_trial.starts_with("0.00 ")) << "those of other sets were not found";
 }
 
 // Parts put together again have the mean, deviation and rms of the whole.
@@ -149,8 +151,10 @@ TEST(Illumination, TakesTheLargestOfFour) {
     for (int point = 0; point < 4; ++point)
       for (int light = 0; light < (position == 1 && point == 3 ? 3 : 4); ++light)
         points.push_back({position, light, point, {0, 0}, 0.1 * light + position, 0});
+  points.push_back({2, 0, 0, {0, 0}, std::nan(""), 0});  // the only one of its kind
   const auto of_method = summed_up(Method::surface, points);
   ASSERT_EQ(of_method.largest.size(), 7U);
+  EXPECT_EQ(of_method.to_centroid.count, 31U);
   EXPECT_NEAR(of_method.largest[0].px, 0.3, 1e-12);
   EXPECT_NEAR(of_method.of_largest.mean, (4 * 0.3 + 3 * 1.3) / 7, 1e-12);
 }

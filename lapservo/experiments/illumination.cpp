@@ -1,6 +1,7 @@
 #include "lapservo/experiments/illumination.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <utility>
 
@@ -40,7 +41,8 @@ void add_position(std::vector<IlluminationResult::Point>& points, const Sighting
     const auto distances = distances_to_centroid(seen);
     const Eigen::Vector2d true_px = camera.raw_from_ideal(truth.ideal_px[static_cast<std::size_t>(k)]);
     for (std::size_t i = 0; i < seen.size(); ++i)
-      points.push_back({position, under[i], k, seen[i], distances[i], (seen[i] - true_px).norm()});
+      points.push_back(
+          {position, under[i], k, seen[i], seen.size() > 1 ? distances[i] : std::nan(""), (seen[i] - true_px).norm()});
   }
 }
 
@@ -91,7 +93,7 @@ Series by_light(const IlluminationResult::OfMethod& of_method) {
   for (int light = 0; light < light_count; ++light) {
     std::vector<double> distances;
     for (const IlluminationResult::Point& point : of_method.points)
-      if (point.light == light) distances.push_back(point.to_centroid_px);
+      if (point.light == light && std::isfinite(point.to_centroid_px)) distances.push_back(point.to_centroid_px);
     if (distances.empty()) continue;
     series.x.push_back(100 * IlluminationResult::lights[static_cast<std::size_t>(light)]);
     series.y.push_back(spread_of(distances).mean);
@@ -125,16 +127,16 @@ std::vector<Comparison> comparisons_of(const IlluminationResult& result) {
   const auto row = comparing(result.methods);
   const std::string points = fmt::format("{}", 4 * IlluminationResult::positions);
   const std::string measurements = fmt::format("{}", 4 * IlluminationResult::positions * light_count);
-  return {row("largest distance of a point\u2019s four measurements to their centroid, mean \u00b1 std of " + points +
-                  " points",
+  return {row("largest distance of a point\u2019s four measurements to their centroid, mean \u00b1 std of the "
+              "points that were found under all four lights",
               fmt::format("{:.2f} \u00b1 {:.2f} px", IlluminationResult::paper_mean_px,
                           IlluminationResult::paper_deviation_px),
               [](const auto& m) { return mean_and_deviation(m.of_largest, "px"); }),
-          row("points found under all four lights", points,
+          row("points that were found under all four lights", points,
               [](const auto& m) { return fmt::format("{}", m.largest.size()); }),
           row("measurements", measurements, [](const auto& m) { return fmt::format("{}", m.points.size()); }),
           row("the largest distance of all", "",
-              [](const auto& m) { return fmt::format("{:.3f} px", m.of_largest.largest); }),
+              [](const auto& m) { return with_digits(m.of_largest.largest, 3) + " px"; }),
           row("distance to their centroid, all measurements, mean \u00b1 std", "",
               [](const auto& m) { return mean_and_deviation(m.to_centroid, "px"); }),
           row("distance to the truth, all measurements, mean \u00b1 std", "",
@@ -185,7 +187,7 @@ IlluminationResult::OfMethod summed_up(Method method, std::vector<IlluminationRe
   std::vector<double> largest, to_centroid, to_truth;
   for (const IlluminationResult::Largest& of_point : of_method.largest) largest.push_back(of_point.px);
   for (const IlluminationResult::Point& point : of_method.points) {
-    to_centroid.push_back(point.to_centroid_px);
+    if (std::isfinite(point.to_centroid_px)) to_centroid.push_back(point.to_centroid_px);
     to_truth.push_back(point.to_truth_px);
   }
   of_method.of_largest = spread_of(std::move(largest));
@@ -215,7 +217,8 @@ ReportSection section_of(const IlluminationResult& result, const ExperimentSetup
   section.text = {fmt::format(
       "The instrument stands still at {} positions spread over the field of view, lit at {} of the lamps\u2019 power. "
       "Each of the four boundary points should stay where it is. As in the paper: of each point in each position the "
-      "largest distance of its {} measurements to their centroid, and of these {} distances the mean and the standard "
+      "largest distance of its {} measurements to their centroid, and of these {} distances, less those of points that "
+      "were not found under every light, the mean and the standard "
       "deviation.",
       IlluminationResult::positions, percents(), light_count, 4 * IlluminationResult::positions)};
   section.comparisons = comparisons_of(result);

@@ -23,7 +23,7 @@ struct IlluminationResult {
   struct Point {
     int position, light, point;  ///< light: index into `lights`; point: 0 to 3, of e0 to e3
     Eigen::Vector2d raw_px;
-    double to_centroid_px;  ///< distance to the centroid of this point over the lights it was found under
+    double to_centroid_px;  ///< distance to the centroid of this point over the lights it was found under; NaN of one
     double to_truth_px;
   };
   /// The paper's figure for one point in one position, found under every light.

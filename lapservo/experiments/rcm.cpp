@@ -79,6 +79,7 @@ Plot fractions_within(const RcmResult& result) {
   for (const auto& of_method : result.methods) {
     Series series{method_title(of_method.method), {}, {}, Draw::line, method_colour(of_method.method)};
     const auto distances = distances_of(of_method, 0);
+    if (distances.empty()) continue;
     for (int percent = 1; percent <= 100; ++percent) {
       series.x.push_back(quantile_of(distances, 0.01 * percent));
       series.y.push_back(percent);
@@ -123,9 +124,9 @@ Table by_estimator(const RcmResult& result) {
     for (const bool pairwise : {true, false}) {
       const auto& of = pairwise ? of_method.pairwise : of_method.least_squares;
       table.rows.push_back({method_title(of_method.method), pairwise ? "mean of intersections" : "total least squares",
-                            fmt::format("{:.3f}", of.distance.mean), fmt::format("{:.3f}", of.distance.deviation),
-                            fmt::format("{:.3f}", of.distance.median), fmt::format("{:.3f}", of.distance.largest),
-                            fmt::format("{:.2f}", of.in_sigmas),
+                            with_digits(of.distance.mean, 3), with_digits(of.distance.deviation, 3),
+                            with_digits(of.distance.median, 3), with_digits(of.distance.largest, 3),
+                            with_digits(of.in_sigmas, 3),
                             fmt::format("{} of {}", of.estimates.size(), RcmResult::sets)});
     }
   return table;
@@ -134,7 +135,10 @@ Table by_estimator(const RcmResult& result) {
 std::vector<Comparison> comparisons_of(const RcmResult& result) {
   const auto row = comparing(result.methods);
   const auto quantile = [](double fraction) {
-    return [fraction](const auto& m) { return with_digits(quantile_of(distances_of(m, 0), fraction), 3) + " px"; };
+    return [fraction](const auto& m) {
+      const auto distances = distances_of(m, 0);
+      return distances.empty() ? unknown_text : with_digits(quantile_of(distances, fraction), 3) + " px";
+    };
   };
   return {row("intersections of two lines: distance from the true RCM, mean \u00b1 std",
               fmt::format("{:.2f} \u00b1 {:.2f} px", RcmResult::paper_mean_px, RcmResult::paper_deviation_px),
@@ -156,7 +160,7 @@ std::vector<Comparison> comparisons_of(const RcmResult& result) {
 }  // namespace
 
 RcmResult::Estimates summed_up(std::vector<RcmResult::Estimate> estimates) {
-  RcmResult::Estimates summary{std::move(estimates), {}, 0};
+  RcmResult::Estimates summary{std::move(estimates), {}};
   std::vector<double> distances;
   double squares = 0;
   int coordinates = 0;

@@ -36,8 +36,9 @@ struct RcmResult {
   /// The estimates of one estimator.
   struct Estimates {
     std::vector<Estimate> estimates;
-    Spread distance;       ///< of the errors' lengths, pixels
-    double in_sigmas = 0;  ///< rms of the error in units of its own covariance, by coordinate: ideally 1
+    Spread distance;  ///< of the errors' lengths, pixels
+    /// rms of the error in units of its own covariance, by coordinate: ideally 1; NaN where none has a covariance
+    double in_sigmas = std::nan("");
   };
   struct OfMethod {
     Method method;

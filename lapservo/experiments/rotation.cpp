@@ -26,6 +26,7 @@ std::uint64_t seed_of(const ExperimentSetup& setup, int set) {
 
 std::string mrad(double rad) {
   const double value = 1e3 * rad;
+  if (!std::isfinite(value)) return unknown_text;
   return fmt::format("{:.{}f}", value, std::abs(value) < 10 ? 2 : 1);
 }
 
@@ -83,22 +84,22 @@ Table table_one(const RotationResult& result) {
   return table;
 }
 
-std::string from_to(double least, double most) {
+std::string range_of(std::span<const double> figures) {
+  if (figures.empty()) return unknown_text;
+  const auto [least, most] = std::ranges::minmax(figures);
   return fmt::format("{} to {} mrad", mrad(least), mrad(most));
 }
 
+// Of the trials in which it is known.
 std::string range_of(const RotationResult::OfMethod& of_method, double Spread::*figure) {
-  const auto [least, most] = std::ranges::minmax_element(of_method.by_trial, {}, figure);
-  return from_to((*least).*figure, (*most).*figure);
-}
-
-std::string range_of(const std::array<double, RotationResult::trials>& figures) {
-  const auto [least, most] = std::minmax_element(figures.begin(), figures.end());
-  return from_to(*least, *most);
+  std::vector<double> known;
+  for (const Spread& trial : of_method.by_trial)
+    if (std::isfinite(trial.*figure)) known.push_back(trial.*figure);
+  return range_of(known);
 }
 
 std::string percent(double fraction) {
-  return fmt::format("{:.3g} %", 100 * fraction);
+  return std::isfinite(fraction) ? fmt::format("{:.3g} %", 100 * fraction) : unknown_text;
 }
 
 std::vector<Comparison> comparisons_of(const RotationResult& result) {
@@ -108,6 +109,8 @@ std::vector<Comparison> comparisons_of(const RotationResult& result) {
               [](const auto& m) { return range_of(m, &Spread::deviation); }),
           row("mean error, from trial to trial", range_of(RotationResult::paper_mean_rad),
               [](const auto& m) { return range_of(m, &Spread::mean); }),
+          row("frames in which it was found: the figures below are of these", "not given",
+              [](const auto& m) { return fmt::format("{} of {}", m.samples.size(), frames); }),
           row("rms error of all trials together, bias included", mrad(paper.rms) + " mrad (from its Table I)",
               [](const auto& m) { return mrad(m.all.rms) + " mrad"; }),
           row("standard deviation of all trials together", mrad(paper.deviation) + " mrad (from its Table I)",
@@ -119,9 +122,7 @@ std::vector<Comparison> comparisons_of(const RotationResult& result) {
           row("errors under 0.1 rad", "half", [](const auto& m) { return percent(m.under_100mrad); }),
           row("errors under 0.2 rad", "most", [](const auto& m) { return percent(m.under_200mrad); }),
           row("normalised error (rms of error / sigma, ideally 1)", "",
-              [](const auto& m) { return fmt::format("{:.2f}", m.in_sigmas.rms); }),
-          row("frames in which it was found", "",
-              [](const auto& m) { return fmt::format("{} of {}", m.samples.size(), frames); })};
+              [](const auto& m) { return with_digits(m.in_sigmas.rms, 3); })};
 }
 
 std::vector<Figure> figures_of(const RotationResult& result) {

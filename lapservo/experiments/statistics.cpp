@@ -15,6 +15,7 @@ Spread spread_of(std::vector<double> values) {
   spread.count = values.size();
   if (values.empty()) return spread;
   const auto n = static_cast<double>(values.size());
+  spread.mean = spread.largest = 0;
   for (const double value : values) {
     spread.mean += value / n;
     spread.largest = std::max(spread.largest, std::abs(value));
@@ -28,12 +29,13 @@ Spread spread_of(std::vector<double> values) {
 }
 
 double fraction_within(const std::vector<double>& values, double bound) {
-  if (values.empty()) return 0;
+  if (values.empty()) return std::nan("");
   const auto within = std::count_if(values.begin(), values.end(), [bound](double v) { return std::abs(v) < bound; });
   return static_cast<double>(within) / static_cast<double>(values.size());
 }
 
 std::string with_digits(double value, int digits) {
+  if (!std::isfinite(value)) return unknown_text;
   const double power = value == 0 ? 0 : std::floor(std::log10(std::abs(value)));
   return fmt::format("{:.{}f}", value, static_cast<int>(std::clamp(digits - 1 - power, 0.0, 9.0)));
 }

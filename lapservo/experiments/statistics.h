@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -9,21 +10,25 @@
 
 namespace lapservo::internal {
 
-/// Statistics of a list of numbers: all zero when it is empty.
+/// Statistics of a list of numbers. One that needs more numbers than there are is NaN: not known.
 struct Spread {
   std::size_t count = 0;
-  double mean = 0;
-  double deviation = 0;  ///< standard deviation about the mean, of the sample (n - 1)
-  double rms = 0;
-  double largest = 0;  ///< magnitude
-  double median = 0;
+  double mean = std::nan("");
+  double deviation = mean;  ///< standard deviation about the mean, of the sample (n - 1); of two numbers or more
+  double rms = mean;
+  double largest = mean;  ///< magnitude
+  double median = mean;
 };
 Spread spread_of(std::vector<double> values);
 
-/// The fraction of the magnitudes that is smaller than a bound; 0 for an empty list.
+/// The fraction of the magnitudes that is smaller than a bound; NaN for an empty list.
 double fraction_within(const std::vector<double>& values, double bound);
 
-/// A number with the given count of digits, or more where a whole number has more; no exponent.
+/// What tables have in the place of a number that is not known.
+inline constexpr const char* unknown_text = "\u2013";
+
+/// A number with the given count of digits, or more where a whole number has more; no exponent. unknown_text where it
+/// is not finite.
 std::string with_digits(double value, int digits);
 
 /// "1.49 ± 1.2 px": three digits of the mean, two of the deviation.
