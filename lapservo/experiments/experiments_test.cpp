@@ -13,6 +13,7 @@
 #include "lapservo/experiments/tracking.h"
 #include "lapservo/kinematics/visibility.h"
 #include "lapservo/rig/instruments.h"
+#include "lapservo/sim/tissue.h"
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/rigs.h"
 #include "lapservo/testing/temporary_folder.h"
@@ -56,6 +57,19 @@ TEST(Positions, ThatAreNeverInViewAreAnError) {
   rig.instruments[0].camera_from_rcm->translation.z() = -5;
   Random random(seed);
   EXPECT_THROW(spread_positions(rig, 1, random), InputError);
+}
+
+TEST(Eyes, SeeTheRigItselfWhateverItsSigmasAre) {
+  Rig rig = testing::small_test_rig();
+  Random random(seed);
+  const cv::Mat tissue = make_tissue(rig.camera.width_px, rig.camera.height_px, seed),
+                frame = Stage(rig, tissue).render(spread_positions(rig, 1, random)[0], 1, seed);
+  const auto variance = [&] { return Eyes(rig, {Method::surface}).observe(frame)[0].rcm.value().covariance(3, 3); };
+  const double exact = variance();
+  rig.instruments[0].sigma_translation_m = {1e-3, 1e-3, 1e-3};
+  rig.instruments[0].sigma_quaternion_xyzw = {3e-3, 3e-3, 3e-3, 3e-3};
+  rig.instruments[0].marker.sigmas.seam_rad = 0.012, rig.instruments[0].marker.tolerance_m = 1e-4;
+  EXPECT_EQ(variance(), exact);
 }
 
 TEST(SingleInstrument, NeedsARegistration) {

@@ -14,6 +14,18 @@ Rig without_registration(Rig rig) {
   return rig;
 }
 
+Rig known_exactly(Rig rig) {
+  rig.camera.sigmas = {}, rig.camera.covariance.reset();
+  rig.camera.response.sigma.reset(), rig.camera.response.sigma_light.clear(), rig.camera.response.sigma_value.clear();
+  for (Instrument& instrument : rig.instruments) {
+    instrument.sigma_translation_m.reset(), instrument.sigma_quaternion_xyzw.reset();
+    instrument.registration_covariance.reset(), instrument.sigma_image_delay_s.reset();
+    instrument.marker.sigmas = {}, instrument.marker.tolerance_m = 0;
+    if (instrument.joints) instrument.joints->sigma_offset.reset();
+  }
+  return rig;
+}
+
 std::string method_title(Method method) {
   return method == Method::centerline ? "the paper\u2019s method" : "the default";
 }

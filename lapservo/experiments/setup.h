@@ -32,6 +32,9 @@ Rig paper_rig();
 
 /// For trackers that must not know where the RCM is.
 Rig without_registration(Rig rig);
+/// Without its `sigma_` keys, covariances and the print's tolerance: for trackers of images of the rig itself, which it
+/// describes exactly.
+Rig known_exactly(Rig rig);
 
 /// "the paper's method" or "the default".
 std::string method_title(Method method);

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "lapservo/core/error.h"
+#include "lapservo/experiments/setup.h"
 #include "lapservo/kinematics/visibility.h"
 #include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/shaft_lighting.h"
@@ -45,7 +46,7 @@ cv::Mat Stage::render(const JointVector& q, double lamp_power, std::uint64_t see
 }
 
 Eyes::Eyes(const Rig& rig, const std::vector<Method>& methods) {
-  for (const Method method : methods) trackers_.emplace_back(rig, TrackerOptions{method, true});
+  for (const Method method : methods) trackers_.emplace_back(known_exactly(rig), TrackerOptions{method, true});
 }
 
 std::vector<Observation> Eyes::observe(const cv::Mat& frame) {

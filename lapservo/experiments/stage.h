@@ -34,7 +34,7 @@ class Stage {
   std::unique_ptr<Renderer> renderer_;  // of that power
 };
 
-/// The eyes: one tracker per method, each frame on its own.
+/// The eyes: one tracker per method, each frame on its own, by a rig that is known_exactly().
 class Eyes {
  public:
   Eyes(const Rig& rig, const std::vector<Method>& methods);

@@ -178,7 +178,8 @@ std::optional<TrackingRun> run_scenario(const TrackingScenario& scenario, const 
   Simulator simulator(setup.rig, tracking_simulator(scenario, setup.seed), start);
   if (scenario.hidden_from_s) simulator.cover_marker({*scenario.hidden_from_s, *scenario.hidden_to_s});
 
-  RunConfig config{setup.rig, tracking_controller(scenario, setup.rig.camera), {}, {scenario.method, false}};
+  RunConfig config{
+      known_exactly(setup.rig), tracking_controller(scenario, setup.rig.camera), {}, {scenario.method, false}};
   if (scenario.mode == ControlMode::uncalibrated) {
     config.rig.instruments[0].camera_from_rcm.reset();
     config.rcm_px = rcm_px;
