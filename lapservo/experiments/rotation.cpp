@@ -90,7 +90,7 @@ std::string range_of(std::span<const double> figures) {
   return fmt::format("{} to {} mrad", mrad(least), mrad(most));
 }
 
-// Of the trials in which it is known.
+// Trials in which it is not known do not count.
 std::string range_of(const RotationResult::OfMethod& of_method, double Spread::*figure) {
   std::vector<double> known;
   for (const Spread& trial : of_method.by_trial)

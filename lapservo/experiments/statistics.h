@@ -24,7 +24,7 @@ Spread spread_of(std::vector<double> values);
 /// The fraction of the magnitudes that is smaller than a bound; NaN for an empty list.
 double fraction_within(const std::vector<double>& values, double bound);
 
-/// What tables have in the place of a number that is not known.
+/// Stands in tables for a number that is not known.
 inline constexpr const char* unknown_text = "\u2013";
 
 /// A number with the given count of digits, or more where a whole number has more; no exponent. unknown_text where it
