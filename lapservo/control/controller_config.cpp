@@ -1,7 +1,10 @@
 #include "lapservo/control/controller_config.h"
 
 #include <cmath>
+#include <numbers>
 #include <string>
+
+#include <fmt/format.h>
 
 #include "lapservo/control/delay_estimator.h"
 #include "lapservo/control/motion_limits.h"
@@ -39,6 +42,23 @@ void check_gains(const ControllerConfig& config) {
     const double gain = config.gains.per_s[i];
     require_not_negative(element("gains_per_s", i), gain, "0 or more per second");
     require(gain * config.period_s < 1, element("gains_per_s", i), gain, "less than one per control period");
+  }
+}
+
+// Eq. (21) takes the late image for the present: its errors decay without a swing where gain x delay is below 1/e, and
+// swing for ever beyond pi/2.
+void check_late_image(const ControllerConfig& config) {
+  if (config.mode != ControlMode::paper) return;
+  const double delay_s = config.observer.delay_s.value_or(config.observer.initial_delay_s);
+  const double most_per_s = 1 / (std::numbers::e * delay_s);
+  for (int i = 0; i < 4; ++i) {
+    const double gain = config.gains.per_s[i];
+    if (!(gain >= most_per_s)) continue;
+    throw InputError("controller", element("gains_per_s", i), std::to_string(gain),
+                     fmt::format("at most {:.2f} per second: mode paper takes images that are {:.3f} s late for the "
+                                 "present, and overshoots where gain x delay is above 1/e. Lower the gain, or give "
+                                 "delay_s if it is less",
+                                 std::floor(100 * most_per_s) / 100, delay_s));
   }
 }
 
@@ -134,6 +154,7 @@ ControllerConfig checked(const ControllerConfig& config) {
   require_positive("scales.features", config.scales.features);
   require_positive("scales.joints", config.scales.joints);
   check_observer(config.observer);
+  check_late_image(config);
   check_learning(config);
   require_positive("damping_threshold", config.damping_threshold);
   require_not_negative("min_singular_value", config.min_singular_value);

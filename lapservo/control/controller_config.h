@@ -101,7 +101,8 @@ struct ControllerConfig {
   ControlMode mode = ControlMode::fused;
   double period_s = 1.0 / 60;  ///< between calls of step()
   /// Decay rates per second. Modes `fused` and `uncalibrated` turn them into the exact gains of the sampled loop;
-  /// `paper` uses them as they stand (set them to paper_gains(period_s)).
+  /// `paper` uses them as they stand (set them to paper_gains(period_s)), each below 1 / (e x the images' delay), which
+  /// is observer.delay_s or, without one, observer.initial_delay_s.
   TrackingGains gains;
   JointLimits limits;
   std::optional<ImageWindow> window;  ///< the camera's image less a margin, for the marker's ends

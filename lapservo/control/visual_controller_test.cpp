@@ -610,6 +610,7 @@ TEST(VisualController, NothingMakesItLeaveItsLimits) {
       ControllerConfig config = testing::test_config(flaws);
       config.mode = mode;
       config.gains.per_s.setConstant(chance.uniform(0.5, 10));
+      if (mode == ControlMode::paper) config.observer.delay_s = 0;  // it is not: such gains are refused
       Sinusoids wild = paper_sinusoids();
       wild.amplitude *= 20;
       run_anywhere(config, testing::model_of({}), flaws, sinusoids(wild), 15, seed);
@@ -625,6 +626,9 @@ TEST(VisualController, SaysWhatIsWrongWithAConfiguration) {
       {[](ControllerConfig& c) { c.limits.upper[1] = c.limits.lower[1]; }, "limits.upper[1]"},
       {[](ControllerConfig& c) { c.limits.upper[2] = 229; }, "/ 2[2]: is 114.485000, expected metres within 1 for"},
       {[](ControllerConfig& c) { c.period_s = 0; }, "period_s"},
+      {[](ControllerConfig& c) { c = paper_controller(1.0 / 60), c.gains.per_s[1] = 3.7; },
+       "gains_per_s[1]: is 3.700000, expected at most 3.67 per second: mode paper takes images that are 0.100 s late"},
+      {[](ControllerConfig& c) { c = paper_controller(1.0 / 60), c.observer.delay_s = 0.2; }, "at most 1.83 per"},
       {[](ControllerConfig& c) { c.observer.delay_s = 1; }, "controller: delay_s: is 1"}};
   for (const auto& [change, word] : wrongs) {
     ControllerConfig config;

@@ -96,6 +96,7 @@ class EndoscopeOfAnArm : public EndoscopePose {
 RunConfig config_of(const Rig& rig, const Case& c) {
   RunConfig config;
   config.rig = rig;
+  if (c.mode == ControlMode::paper) config.controller = paper_controller(config.controller.period_s);
   config.controller.mode = c.mode;
   config.controller.window = image_window(rig.camera, 10);
   config.tracking_thread = c.thread;
