@@ -36,7 +36,8 @@ struct ControlStep {
   bool limited = false;                                ///< a limit keeps the motion from what the law wants
   std::optional<Estimate> estimate;                 ///< the instrument now; given while holding too, when there is one
   Eigen::Vector4d error = Eigen::Vector4d::Zero();  ///< estimated features minus desired ones; zero without estimate
-  double delay_s = 0;                               ///< estimated delay of the image
+  double delay_s = 0;                               ///< delay of the image by which the step goes
+  bool delay_is_known = false;                      ///< given or estimated: else a first guess
   std::optional<Unanswered> unanswered{};           ///< with HoldReason::image_not_following
 };
 

@@ -18,7 +18,8 @@ class LatestImageEstimator : public Estimator {
   LatestImageEstimator(const ControllerConfig& config, FeatureModel model)
       : model_(std::move(model)),
         scales_(config.scales),
-        delay_s_(config.observer.delay_s.value_or(config.observer.initial_delay_s)) {}
+        delay_s_(config.observer.delay_s.value_or(config.observer.initial_delay_s)),
+        delay_is_given_(config.observer.delay_s.has_value()) {}
 
   HoldReason update(const ImageMeasurement& image, const JointHistory& history) override {
     const auto q = configuration_of(image, history);
@@ -36,6 +37,7 @@ class LatestImageEstimator : public Estimator {
   }
   std::optional<Estimate> at(double, const Eigen::Vector4d&) const override { return latest_; }
   double delay_s() const override { return delay_s_; }
+  bool delay_is_known() const override { return delay_is_given_; }
 
  private:
   std::optional<Eigen::Vector4d> configuration_of(const ImageMeasurement& image, const JointHistory& history) const {
@@ -48,6 +50,7 @@ class LatestImageEstimator : public Estimator {
   FeatureModel model_;
   Scales scales_;
   double delay_s_;
+  bool delay_is_given_;
   std::optional<Estimate> latest_;
 };
 

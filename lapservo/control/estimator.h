@@ -29,7 +29,7 @@ class Estimator {
 
   /// The images' delay, known or estimated.
   virtual double delay_s() const = 0;
-  /// False while it is a first guess that motion will improve.
+  /// False while it is a first guess: until motion shows it; ControlMode::paper never learns one.
   virtual bool delay_is_known() const { return true; }
 
   /// The joint that a probing motion moved and no image showed, with HoldReason::image_not_following.

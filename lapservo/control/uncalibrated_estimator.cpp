@@ -47,6 +47,7 @@ class UncalibratedEstimator : public Estimator {
     now.covariance *= learnt->jacobian.variance_at(q_joint);
     return now;
   }
+  bool delay_is_known() const override { return config_.observer.delay_s || std::holds_alternative<Learnt>(state_); }
   double delay_s() const override {
     if (config_.observer.delay_s) return *config_.observer.delay_s;
     const auto* learnt = std::get_if<Learnt>(&state_);

@@ -115,6 +115,7 @@ ControlStep VisualController::step(double time_s, const Eigen::Vector4d& q_joint
   step.setpoint = path_.end();
   if (step.estimate && all_finite(desired)) step.error = feature_error(step.estimate->features, desired.features);
   step.delay_s = delay_s();
+  step.delay_is_known = delay_is_known();
   if (!follows_ || step.action != ControlAction::track || !step.estimate) {
     error_growth_.restart();
   } else if (error_growth_.add(desired, step.error)) {

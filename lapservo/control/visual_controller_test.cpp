@@ -511,6 +511,10 @@ TEST_P(Holding, NamesEveryReason) {
   EXPECT_EQ(step({}), HoldReason::no_image_yet);
   for (int k = 0; k < 30; ++k) step(image_at(t));
   EXPECT_EQ(good(), HoldReason::none);
+  EXPECT_TRUE(controller.delay_is_known()) << "it is given";
+  ControllerConfig not_given = config;
+  not_given.observer.delay_s.reset();
+  EXPECT_FALSE(VisualController(not_given, testing::model_of(rig)).delay_is_known());
   EXPECT_EQ(step({}), HoldReason::none) << "one frame without news is no reason";
   ImageMeasurement lost = image_at(t);
   lost.found = false;

@@ -86,8 +86,8 @@ class Recorder : public RunObserver {
       for (const double value : four) put(value);
     put(holds);
     put(control.limited);
-    put(control.delay_s);
-    run_.delay_s = control.delay_s;
+    run_.delay_s = control.delay_is_known ? control.delay_s : std::nan("");
+    put(run_.delay_s);
     run_.rate_fraction =
         std::max(run_.rate_fraction, control.setpoint.velocity.cwiseAbs().cwiseQuotient(limits_.rate).maxCoeff());
     note_hold(tick.input.time_s, holds);

@@ -35,7 +35,7 @@ struct TrackingRun {
   Eigen::Vector4d steady_rms = Eigen::Vector4d::Zero(), steady_mean = Eigen::Vector4d::Zero(),
                   steady_largest = Eigen::Vector4d::Zero();
   Eigen::Vector4d decay_per_s = Eigen::Vector4d::Zero();  ///< of each feature's error at the start; NaN: not measured
-  double delay_s = 0;                                     ///< the estimate at the end
+  double delay_s = 0;                                     ///< the estimate at the end; NaN: none
   double rate_fraction = 0;                               ///< largest setpoint rate as a fraction of its limit
   std::optional<double> held_s, resumed_s;                ///< after the marker was hidden, after it was back
   std::optional<double> back_s;                           ///< from the marker's return to within 1 px and 5 mrad

@@ -9,6 +9,7 @@
 
 #include "lapservo/control/paper_trajectory.h"
 #include "lapservo/core/angles.h"
+#include "lapservo/experiments/statistics.h"
 #include "lapservo/experiments/tracking.h"
 #include "lapservo/sim/simulator.h"
 
@@ -107,9 +108,9 @@ Table run_table(const TrackingResult& result) {
   };
   for (const TrackingRun& run : result.runs)
     table.rows.push_back({run.scenario.title, fmt::format("{:.0f}", 1000 * run.scenario.latency_s),
-                          fmt::format("{:.0f}", 1000 * run.delay_s), converged_text(run),
-                          fmt::format("{:.3f}", 1000 * run.steady_rms[0]), three(run.steady_rms, false),
-                          three(run.steady_mean, true), three(run.steady_largest, false),
+                          std::isfinite(run.delay_s) ? fmt::format("{:.0f}", 1000 * run.delay_s) : unknown_text,
+                          converged_text(run), fmt::format("{:.3f}", 1000 * run.steady_rms[0]),
+                          three(run.steady_rms, false), three(run.steady_mean, true), three(run.steady_largest, false),
                           fmt::format("{:.2f}", run.rate_fraction)});
   return table;
 }

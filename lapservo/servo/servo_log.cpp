@@ -98,7 +98,7 @@ void add_decision(Fields& fields, const ServoDecision& decision) {
   fields.add("reason", to_string(control.reason));
   fields.add("send", decision.send ? "1" : "0");
   fields.add("limited", control.limited ? "1" : "0");
-  fields.add("delay_s", text_of(control.delay_s));
+  fields.add("delay_s", control.delay_is_known ? text_of(control.delay_s) : "");
   fields.add("registration", fmt::format("{}", decision.registration));
   fields.add("camera_from_rcm_", decision.camera_from_rcm);
   fields.add("velocity_", joint_rates, control.velocity.data());
