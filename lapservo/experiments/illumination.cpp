@@ -83,7 +83,7 @@ cv::Mat example(const ExperimentSetup& setup, Stage& stage, const JointVector& q
 }
 
 Series by_position(const IlluminationResult::OfMethod& of_method) {
-  const auto point = [](const IlluminationResult::Largest& one) { return PlotPoint({one.position + 1, one.px}); };
+  const auto point = [](const IlluminationResult::Largest& one) { return PlotPoint({one.position, one.px}); };
   return series_of(method_title(of_method.method), of_method.largest, point, Draw::points,
                    method_colour(of_method.method));
 }
@@ -111,7 +111,7 @@ Plot distance_plot(const std::string& title, Axis x, const std::string& y, const
 Plot plot_of_largest(const IlluminationResult& result) {
   Plot plot =
       distance_plot("Largest distance to the centroid, by position",
-                    {"position", "", 0, IlluminationResult::positions + 1.0}, "largest distance", result, by_position);
+                    {"position", "", -1, IlluminationResult::positions}, "largest distance", result, by_position);
   plot.references.push_back({fmt::format("the paper\u2019s mean: {} px", IlluminationResult::paper_mean_px),
                              IlluminationResult::paper_mean_px});
   return plot;

@@ -15,7 +15,8 @@ struct SigmaMap {
   static constexpr int columns = 7, rows = 5;
   double depth_m = 0;  ///< of the marker's middle
   static constexpr std::size_t cells = static_cast<std::size_t>(columns) * rows;
-  /// By row, rms over rotations; empty where the marker is not wholly in view or is not found.
+  /// By row, the median over three rotations, of which one that is not found counts as the largest; empty where the
+  /// marker is not wholly in view or is not found.
   std::array<std::optional<double>, cells> sigma_rad{};
   /// Where it is in view, but at most of the rotations not found.
   std::array<bool, cells> lost{};
