@@ -91,8 +91,7 @@ TEST(MotionLimits, LetAnArmOutOfRangeComeBackOnly) {
   EXPECT_TRUE(next.limited);
   for (int k = 0; k < 200; ++k) {
     next = limit_velocity(limits, {}, motion, {}, -limits.rate, Eigen::Matrix4d::Identity(), period_s);
-    motion.position += period_s * (motion.velocity + next.velocity) / 2;
-    motion.velocity = next.velocity;
+    motion.position += period_s * (motion.velocity + next.velocity) / 2, motion.velocity = next.velocity;
   }
   EXPECT_LE(beyond(limits, motion), 1e-9);
 }

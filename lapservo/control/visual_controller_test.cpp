@@ -28,9 +28,7 @@ const Eigen::Vector4d close_enough{0.005, 1, 1, 1};
 /// Kinematic offsets of 2 degrees and 3 mm, a lagging arm.
 Flaws usual_flaws(const Eigen::Vector4d& backlash = Eigen::Vector4d::Zero()) {
   Flaws flaws;
-  flaws.offset = {0.035, -0.035, 0.003, 0.035};
-  flaws.lag_s = 0.02;
-  flaws.backlash = backlash;
+  flaws.offset = {0.035, -0.035, 0.003, 0.035}, flaws.lag_s = 0.02, flaws.backlash = backlash;
   return flaws;
 }
 
@@ -124,11 +122,9 @@ std::optional<double> decay_per_s(const Moments& moments, int feature, double le
 /// ago.
 TEST(PaperLaw, EachFeaturesErrorDecaysWithItsOwnK) {
   Flaws flaws;
-  flaws.latency_s = 0;
-  flaws.noise.setZero();
+  flaws.latency_s = 0, flaws.noise.setZero();
   ControllerConfig config = paper_controller(1.0 / 60);
-  config.window = testing::test_config(flaws).window;
-  config.observer.delay_s = 0;
+  config.window = testing::test_config(flaws).window, config.observer.delay_s = 0;
   EXPECT_EQ(config.gains.per_s, paper_gains(1.0 / 60).per_s);
   const Eigen::Vector4d least(0.01, 15, 8, 12);
   for (const auto& trajectory : {set_point(paper_sinusoids().offset), sinusoids(paper_sinusoids())}) {
@@ -153,8 +149,7 @@ TEST(VisualController, IsStableAtAnyLatencyKnownOrEstimated) {
     for (const double latency_s : {0.0, 0.05, 0.1, 0.15, 0.2, 0.25}) {
       SCOPED_TRACE(std::string(known ? "known " : "estimated ") + std::to_string(latency_s));
       Flaws flaws = usual_flaws();
-      flaws.latency_s = latency_s;
-      flaws.delay_known = known;
+      flaws.latency_s = latency_s, flaws.delay_known = known;
       const auto done = run(flaws, sinusoids(paper_sinusoids()), 30, 7);
       EXPECT_LT(settled_s(done), 5);
       EXPECT_NEAR(done.back().step.delay_s, latency_s, 0.5 / 60);
@@ -167,9 +162,7 @@ TEST(VisualController, IsStableAtAnyLatencyKnownOrEstimated) {
 
 TEST(VisualController, CopesWithDroppedFramesFastStepsAndTheirJitter) {
   Flaws flaws = usual_flaws();
-  flaws.dropped = 0.1;
-  flaws.frame_every = 4;
-  flaws.jitter_s = 0.001;
+  flaws.dropped = 0.1, flaws.frame_every = 4, flaws.jitter_s = 0.001;
   for (const bool known : {true, false}) {
     flaws.delay_known = known;
     ControllerConfig config = testing::test_config(flaws);
@@ -188,8 +181,7 @@ struct Holds {
 // From 2 s to 22 s, one image in so many periods, with jitter and pauses of 0.3 s about every `pause_s`.
 Holds holds_at(long frame_every, double pause_s, std::uint64_t seed) {
   Flaws flaws = usual_flaws();
-  flaws.frame_every = frame_every;
-  flaws.jitter_s = 0.005;
+  flaws.frame_every = frame_every, flaws.jitter_s = 0.005;
   Random random(seed);
   double pause_s_at = pause_s > 0 ? 1 : 1e9;
   flaws.lost = [=](double time_s) mutable {
@@ -240,20 +232,19 @@ TEST(VisualController, SendsNothingBeforeTheFirstMeasuredJoints) {
 
 // Nor do those that make up in the image for a joint at its limit; the first image of a motion is later than all this.
 TEST(VisualController, NoJointIsFasterThanImagesHaveConfirmed) {
-  const TestRig rig;
   Flaws flaws = usual_flaws();
   flaws.latency_s = 0.25;
   double fastest = 0;
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     ControllerConfig config = testing::test_config(flaws);
     Random random(seed);
-    const Eigen::Vector4d start = testing::random_start(rig, config, flaws, random),
+    const Eigen::Vector4d start = testing::random_start({}, config, flaws, random),
                           rate = ImageResponse::unconfirmed_rate(config.limits);
     config.limits.lower[2] = start[2];
     const Eigen::Vector4d beyond = start + flaws.offset - 0.01 * Eigen::Vector4d::UnitZ();
-    VisualController controller(config, testing::model_of(rig));
-    TestSimulator simulator(rig, flaws, start, seed);
-    for (const Moment& m : simulator.run(controller, set_point(exact_map(rig, beyond).value().features), 0.5))
+    const Trajectory goal = set_point(testing::exact_map(TestRig(), beyond).value().features);
+    VisualController controller(config, testing::model_of({}));
+    for (const Moment& m : TestSimulator({}, flaws, start, seed).run(controller, goal, 0.5))
       fastest = std::max(fastest, m.step.velocity.cwiseAbs().cwiseQuotient(rate).maxCoeff());
   }
   EXPECT_NEAR(fastest, 1, 1e-9);
@@ -262,9 +253,7 @@ TEST(VisualController, NoJointIsFasterThanImagesHaveConfirmed) {
 TestRig wrong_rig(Random& random) {
   TestRig rig;
   const double focal = random.uniform(0.8, 1.2);
-  rig.camera.fx_px *= focal;
-  rig.camera.fy_px *= focal;
-  rig.marker.diameter_m *= random.uniform(0.95, 1.05);
+  rig.camera.fx_px *= focal, rig.camera.fy_px *= focal, rig.marker.diameter_m *= random.uniform(0.95, 1.05);
   const Eigen::Vector3d axis(random.normal(), random.normal(), random.normal());
   rig.camera_from_rcm.rotation =
       rig.camera_from_rcm.rotation * Eigen::AngleAxisd(rad_from_deg(random.uniform(-10, 10)), axis.normalized());
@@ -338,8 +327,7 @@ TEST(VisualController, ConvergesUncalibratedFromRandomStarts) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     SCOPED_TRACE(seed);
     Flaws flaws = usual_flaws({0, 0, 0.0001, 0.02});
-    flaws.delay_known = seed % 2 == 0;
-    flaws.latency_s = 0.02 * static_cast<double>(seed % 10);
+    flaws.delay_known = seed % 2 == 0, flaws.latency_s = 0.02 * static_cast<double>(seed % 10);
     ControllerConfig config = testing::test_config(flaws);
     config.mode = ControlMode::uncalibrated;
     const auto done = run(config, {}, flaws, set_point(paper_sinusoids().offset), 12, seed);
@@ -369,8 +357,7 @@ TEST(VisualController, ProbesInTheImageFromTheEdgeOfTheWindow) {
 TEST(VisualController, OneWildReadingSpoilsNothing) {
   for (const Eigen::Vector4d& wild : {Eigen::Vector4d(0.09, 0, 0, 0), Eigen::Vector4d(0.5, -1, 0.05, 2)}) {
     Flaws flaws = usual_flaws();
-    flaws.latency_s = 0.08;
-    flaws.delay_known = false;
+    flaws.latency_s = 0.08, flaws.delay_known = false;
     flaws.misread = [&](double time_s) {
       return std::abs(time_s - 6) < 0.5 / 60 ? wild : Eigen::Vector4d(Eigen::Vector4d::Zero());
     };
@@ -507,7 +494,10 @@ TEST_P(Holding, NamesEveryReason) {
     return result.reason;
   };
   const auto good = [&] { return step(image_at(t + config.period_s)); };
-
+  const auto once = [&](const std::optional<ImageMeasurement>& image, HoldReason reason) {
+    EXPECT_EQ(step(image), reason);
+    EXPECT_EQ(good(), HoldReason::none);
+  };
   EXPECT_EQ(step({}), HoldReason::no_image_yet);
   for (int k = 0; k < 30; ++k) step(image_at(t));
   EXPECT_EQ(good(), HoldReason::none);
@@ -523,21 +513,16 @@ TEST_P(Holding, NamesEveryReason) {
   EXPECT_EQ(good(), HoldReason::none);
   ImageMeasurement bad = image_at(t);
   bad.features[2] = NAN;
-  EXPECT_EQ(step(bad), HoldReason::non_finite);
-  EXPECT_EQ(good(), HoldReason::none);
-  EXPECT_EQ(step(image_at(t - 5)), HoldReason::stale_image);
-  EXPECT_EQ(good(), HoldReason::none);
+  once(bad, HoldReason::non_finite);
+  once(image_at(t - 5), HoldReason::stale_image);
   for (int k = 0; k < 4; ++k) step({});
   EXPECT_EQ(step({}), HoldReason::none);
-  EXPECT_EQ(step({}), HoldReason::stale_image);
-  EXPECT_EQ(good(), HoldReason::none);
+  once({}, HoldReason::stale_image);
   if (GetParam() == ControlMode::fused) {
     ImageMeasurement outlier = image_at(t + config.period_s);
     outlier.features[2] += 80;
-    EXPECT_EQ(step(outlier), HoldReason::outlier);
-    EXPECT_EQ(good(), HoldReason::none);
+    once(outlier, HoldReason::outlier);
   }
-
   const auto reason_for = [&](double time_s, const Eigen::Vector4d& joints, const DesiredFeatures& wanted) {
     return controller.step(time_s, joints, {}, wanted).reason;
   };

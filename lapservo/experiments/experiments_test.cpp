@@ -192,9 +192,7 @@ TEST(Rcm, ErrorsInSigmasAreOneWhenTheCovarianceIsHonest) {
 // A whole experiment, small: better than the paper, data complete, the same again whichever thread did what.
 TEST(Illumination, EndToEnd) {
   ExperimentSetup setup;
-  setup.rig = testing::small_test_rig();
-  setup.seed = seed;
-  setup.methods = {Method::surface};
+  setup.rig = testing::small_test_rig(), setup.seed = seed, setup.methods = {Method::surface};
   const IlluminationResult result = measure_illumination(setup);
   ASSERT_EQ(result.methods.size(), 1U);
   EXPECT_EQ(result.methods[0].points.size(), 320U);
@@ -220,8 +218,7 @@ TEST(Illumination, EndToEnd) {
 
 TEST(Tracking, StoppedInItsSecondRunKeepsTheFirst) {
   ExperimentSetup setup;
-  setup.rig = paper_rig();
-  setup.seed = seed;
+  setup.rig = paper_rig(), setup.seed = seed;
   const auto first_run = static_cast<int>(TrackingScenario{}.duration_s / tracking_period_s);
   setup.keep_going = [first_run](int done, int) { return done < first_run + 5; };
   const TrackingResult result = measure_tracking(setup);

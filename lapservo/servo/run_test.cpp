@@ -98,8 +98,7 @@ RunConfig config_of(const Rig& rig, const Case& c) {
   config.rig = rig;
   if (c.mode == ControlMode::paper) config.controller = paper_controller(config.controller.period_s);
   config.controller.mode = c.mode;
-  config.controller.window = image_window(rig.camera, 10);
-  config.tracking_thread = c.thread;
+  config.controller.window = image_window(rig.camera, 10), config.tracking_thread = c.thread;
   return config;
 }
 
@@ -183,8 +182,7 @@ PastRun run_case(const Case& c) {
   const EndoscopeOfAnArm held(c.endoscope.value_or(EndoscopeMotion{}), c.arm_error_rad.value_or(0));
   if (c.arm_error_rad) config.endoscope = &held;
   SimulatorConfig simulated;
-  simulated.seed = c.seed;
-  simulated.endoscope.latency_s = c.latency_s;
+  simulated.seed = c.seed, simulated.endoscope.latency_s = c.latency_s;
   if (c.change) c.change(simulated);
   Random random(c.seed);
   const Trajectory trajectory = small_trajectory();
@@ -303,8 +301,7 @@ TEST(Run, IsNeverWrongByPicturesThatAreHardToRead) {
   Case c;
   c.duration_s = 5, c.dark = Interval{2, 2.6};
   c.change = [](SimulatorConfig& config) {
-    config.endoscope.exposure_s = 0.015, config.render.smoke = 0.35F;
-    config.blotches = blood();
+    config.endoscope.exposure_s = 0.015, config.render.smoke = 0.35F, config.blotches = blood();
   };
   const ControllerConfig controller = config_of(testing::small_test_rig(), c).controller;
   const PastRun done = run_case(c);
@@ -761,8 +758,7 @@ class AheadArm : public OperatedArm {
   JointState state() override {
     JointState state = OperatedArm::state();
     if (state.time_s < homing_s_) {
-      state.q = {0, pi / 2, -0.0156, 0};
-      state.blocked = Blocked::busy;
+      state.q = {0, pi / 2, -0.0156, 0}, state.blocked = Blocked::busy;
     } else {
       state.started = std::exchange(homing_s_, 0) > 0;
     }
