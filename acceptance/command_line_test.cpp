@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/ranges.h>
 #include <gtest/gtest.h>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/videoio.hpp>
@@ -22,10 +23,9 @@
 #include "lapservo/crtk/messages.h"
 #include "lapservo/rig/calibration_record.h"
 #include "lapservo/rig/rig.h"
+#include "lapservo/rig/rig_writer.h"
 #include "lapservo/sim/boards.h"
 #ifdef LAPSERVO_TEST_BAGS
-#include <fmt/format.h>
-
 #include "recordings/test_bags.h"
 #endif
 
@@ -517,11 +517,7 @@ TEST_F(CommandLine, CalibrateRegistrationWritesWhereTheArmStands) {
     return std::array{-0.0778 + 0.25 * std::sin(0.9 * t), 1.75 + 0.14 * std::sin(1.3 * t + 1),
                       0.140 + 0.010 * std::sin(0.7 * t), 1.2 * std::sin(0.8 * t + 2)};
   };
-  const auto row = [](const std::array<double, 4>& numbers) {
-    std::string text;
-    for (const double number : numbers) text += (text.empty() ? "" : ",") + std::to_string(number);
-    return text + "\n";
-  };
+  const auto row = [](const std::array<double, 4>& numbers) { return fmt::format("{:f}\n", fmt::join(numbers, ",")); };
   const auto joints_by_clock = [&](double off_s) {
     std::string text = "time_s,yaw,pitch,insertion,roll\n";
     for (int i = -20; i < 50 * frames / fps + 20; ++i) {
@@ -613,7 +609,14 @@ TEST_F(CommandLine, CalibrateRegistrationWritesWhereTheArmStands) {
   expect_done(decide + "out/rig.yaml --out out/decided");
   expect_in(output(), "72 images and the joints; nothing was sent");
   EXPECT_EQ(output().find("not_following"), std::string::npos) << output();
-  expect_done("servo --replay out/decided/log.csv");
+  // The rig's other instruments are tracked beside the one that is steered, which comes first.
+  Rig two = load_rig("out/rig.yaml");
+  Instrument& other = *two.instruments.insert(two.instruments.begin(), two.instruments[0]);
+  other.name = "PSM2", other.marker.hues_deg = {210, 300, 60};
+  expect_done(decide + in("two.yaml", rig_yaml(two)) + " --instrument PSM1 --out out/two");
+  two = load_rig("out/two/rig.yaml");
+  EXPECT_EQ(two.instruments[0].name + two.instruments.back().name, "PSM1PSM2");
+  for (const std::string folder : {"decided", "two"}) expect_done("servo --replay out/" + folder + "/log.csv");
   // A goal of the tip needs the wrist as it was recorded.
   expect_done(decide + with_tool + " --tip 0.0371,-0.0006,0.1602");
   const CsvTable decided = CsvTable::read("out/decided/log.csv");

@@ -166,7 +166,8 @@ void LoopTopics::publish(const ControlTick& tick, const std::string& state) {
   publish_observation(tick, seen_s);
   if (tick.input.time_s < next_drawing_s_) return;
   next_drawing_s_ = tick.input.time_s + between_drawings_s;
-  to_draw_.push_over_oldest({seen_s, tick.seen->image.bgr, tick.seen->observations, tick.seen->camera_from_rcm});
+  to_draw_.push_over_oldest(
+      {seen_s, tick.seen->image.bgr, {tick.seen->observations.front()}, tick.seen->camera_from_rcm});
 }
 
 void LoopTopics::publish_numbers(const ControlTick& tick, double stamp_s) {

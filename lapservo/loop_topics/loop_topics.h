@@ -83,7 +83,7 @@ class LoopTopics {
   struct Drawing {
     double stamp_s = 0;
     cv::Mat bgr;
-    std::vector<Observation> observations;
+    std::vector<Observation> observations;  // of the instrument that is steered
     std::optional<Rigid3> camera_from_rcm;
   };
 

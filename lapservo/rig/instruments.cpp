@@ -12,11 +12,15 @@ Rig first_instrument(Rig rig, const std::string& source) {
   return rig;
 }
 
-Rig single_instrument(Rig rig, const std::string& source) {
-  rig = first_instrument(std::move(rig), source);
-  if (!rig.instruments[0].camera_from_rcm)
+void require_registration(const Rig& rig, const std::string& source) {
+  if (!rig.instruments.at(0).camera_from_rcm)
     throw InputError(source, "instruments[0].camera_from_rcm", "missing",
                      "a transform: lapservo calibrate registration measures it");
+}
+
+Rig single_instrument(Rig rig, const std::string& source) {
+  rig = first_instrument(std::move(rig), source);
+  require_registration(rig, source);
   return rig;
 }
 

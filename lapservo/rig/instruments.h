@@ -12,8 +12,11 @@ namespace lapservo::internal {
 /// The rig with its first instrument only. Throws InputError naming `source` when there is none.
 Rig first_instrument(Rig rig, const std::string& source);
 
-/// The same for the simulator, the experiments and the calibrated loop, which need camera_from_rcm: throws InputError
-/// where it is missing.
+/// For the calibrated loop: throws InputError naming `source` where the first instrument has no camera_from_rcm.
+void require_registration(const Rig& rig, const std::string& source);
+
+/// The first instrument only, with camera_from_rcm, for the simulator and the experiments: throws InputError where it
+/// is missing.
 Rig single_instrument(Rig rig, const std::string& source);
 
 /// Place in Rig::instruments of the one with this name.

@@ -64,7 +64,8 @@ std::string arm_name(const std::string& robot) {
   return colon == std::string::npos ? std::string() : instrument_of(robot.substr(colon + 1));
 }
 
-// That of --instrument, else that of the arm's name, else the first. Another arm's rig would move the wrong joints.
+// First the instrument of --instrument, else that of the arm's name, else the rig's first: another arm's rig would move
+// the wrong joints. The others are tracked beside it, since one that crosses hides it or looks like it.
 Rig steered_rig(const ServoOptions& options) {
   Rig rig = load_rig(options.rig);
   const std::string arm = arm_name(options.robot);
@@ -80,7 +81,7 @@ Rig steered_rig(const ServoOptions& options) {
                                             "{} where it is that arm's under another name",
                                             arm, names_of(rig), rig.instruments.front().name));
   }
-  return first_instrument(std::move(rig), options.rig);
+  return rig;
 }
 
 std::vector<Eigen::Vector4d> points_of(const std::vector<double>& numbers) {
@@ -146,8 +147,8 @@ RunConfig run_config_of(const ServoOptions& options) {
   run.controller = controller_of(options, run.rig);
   if (run.controller.mode != ControlMode::uncalibrated && !options.rcm_px.empty())
     throw InputError("--rcm-px", "is of another method, expected --method uncalibrated with it");
-  if (options.robot == "sim" || run.controller.mode != ControlMode::uncalibrated)
-    run.rig = single_instrument(std::move(run.rig), options.rig);
+  if (options.robot == "sim") run.rig = single_instrument(std::move(run.rig), options.rig);  // it has no others
+  if (run.controller.mode != ControlMode::uncalibrated) require_registration(run.rig, options.rig);
   const std::string goal = goal_option(options);
   run.trajectory_name = goal == "--trajectory" ? options.trajectory : goal;
   // The paper's law comes with the paper's eyes.

@@ -39,11 +39,11 @@ struct ServoOptions {
   double duration_s() const { return duration.value_or(20); }
 };
 
-/// Before it is made to forget anything.
+/// Before it is made to forget anything. The rig's first instrument is steered, the others are tracked with it.
 RunConfig run_config_of(const ServoOptions& options);
 /// The uncalibrated mode gets to know no more of the RCM than its image.
 void forget_registration(RunConfig& run, const ServoOptions& options);
-/// The rig's first instrument. Throws InputError when it has no `joints`.
+/// The instrument that is steered: the rig's first. Throws InputError when it has no `joints`.
 const Instrument& arm_of(const ServoOptions& options, const Rig& rig);
 
 Trajectory trajectory_of(const ServoOptions& options);

@@ -54,8 +54,7 @@ void ServoPage::tell(const ControlTick& tick, double time_s, const std::string& 
     shown_.push_front({seen.tip ? std::optional(seen.tip->camera_from_tip.translation.z()) : std::nullopt,
                        tick.seen->first_from_camera});
     if (shown_.size() > most_shown) shown_.pop_back();
-    newest_ =
-        web_->show({tick.seen->image.bgr, rig_, tick.seen->observations, tick.input.time_s - tick.seen->image.time_s});
+    newest_ = web_->show({tick.seen->image.bgr, rig_, {seen}, tick.input.time_s - tick.seen->image.time_s});
   }
   PageLoop loop = loop_of(tick, time_s);
   loop.can_start = can_start;

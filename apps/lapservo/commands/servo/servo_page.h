@@ -12,7 +12,7 @@
 
 namespace lapservo::app {
 
-/// The page of a loop.
+/// The page of a loop: of the instrument that is steered.
 class ServoPage {
  public:
   /// `may_start`: whether a start moves an arm.
