@@ -321,7 +321,11 @@ class TrackRun {
     watch_for_interrupts();
     if (plays_a_file()) wait_on_page(*web_, [this] { return web_->was_watched(); });
     begin_s_ = clock_.now_s();
-    track_all();
+    try {
+      track_all();
+    } catch (const InputError& error) {
+      fail_with_rows(error);
+    }
     if (plays_a_file() && !stopped_) {
       std::fprintf(stderr, "lapservo: %s has ended; the page stays until Ctrl-C\n", options_.input.c_str());
       web_->end();
@@ -341,6 +345,15 @@ class TrackRun {
     std::fprintf(stderr, "lapservo: %s: stopped after %d frames%s%s\n", options_.input.c_str(), tally_.frames,
                  csv_ ? "; their observations: " : "", csv_ ? csv_->leave().c_str() : "");
     return 1;
+  }
+
+  // In an exception's handler. Rows of frames before stay, as those of a stop do.
+  [[noreturn]] void fail_with_rows(const InputError& error) {
+    const std::string rows = csv_ && passed_on_ > 0 ? csv_->leave().string() : options_.out;
+    if (rows == options_.out) throw;  // none, or where the rows are written is what failed
+    const std::string problem = std::string(error.what()).substr(error.source().size() + 2);
+    throw InputError(error.source(),
+                     fmt::format("{}; the observations of {} frames before are in {}", problem, passed_on_, rows));
   }
 
   // On a page alone, at the speed of the recording.
@@ -367,6 +380,7 @@ class TrackRun {
         lossy_ |= has_jpeg_extension(frame->file);
         diagnosis().add(frame->bgr, observations);
         if ((stopped_ = !pass_on(*frame, observations, came_s))) return;
+        ++passed_on_;
       } catch (const InputError& error) {
         if (error.source() != "image") throw;
         throw error.with_source(frame->file.empty() ? options_.input : frame->file.string());
@@ -472,6 +486,7 @@ class TrackRun {
   SteadyClock clock_;
   double begin_s_ = 0;
   Tally tally_;
+  int passed_on_ = 0;  // frames
   RegistrationWatch registration_;
   std::shared_ptr<const Rig> diagnosed_;
   std::optional<FrameDiagnosis> diagnosis_;  // of frames with that rig
