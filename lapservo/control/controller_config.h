@@ -88,7 +88,7 @@ struct JacobianEstimatorConfig {
   double bend = 12;         ///< how much J changes along a joint scale of motion, in scales: forgetting by distance
   double slack = 3;         ///< features' change that motion doesn't explain (backlash), per joint scale moved
   double gate_chi2 = 60;    ///< of four features; curvature adds to noise, so wider than noise alone would need
-  int reacquire_after = 5;  ///< so many outliers in a row are the truth
+  int reacquire_after = 5;  ///< so many outliers in a row that agree are the truth
 };
 
 struct ProbingConfig {

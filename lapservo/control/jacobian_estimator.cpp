@@ -32,9 +32,11 @@ bool JacobianEstimator::update(const Eigen::Vector4d& q_then, const Eigen::Vecto
   innovation << feature_error(features, expected).cwiseQuotient(scales_.features),
       ends_px - parameters_.row(0).tail<4>().transpose();
   const double variance = covariance_(0, 0) + config_.noise * config_.noise;
-  if (innovation.head<4>().squaredNorm() > config_.gate_chi2 * variance && ++outliers_ < config_.reacquire_after)
-    return false;
-  if (outliers_ >= config_.reacquire_after) {
+  if (innovation.head<4>().squaredNorm() > config_.gate_chi2 * variance) {
+    const bool agrees = (innovation - last_outlier_).head<4>().squaredNorm() < config_.gate_chi2 * variance;
+    outliers_ = outliers_ > 0 && agrees ? outliers_ + 1 : 1;
+    last_outlier_ = innovation;
+    if (outliers_ < config_.reacquire_after) return false;
     // Elsewhere than thought: what is known of G stays, y0 starts anew.
     parameters_.row(0) += innovation.transpose();
     covariance_.row(0).setZero();

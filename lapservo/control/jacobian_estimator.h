@@ -19,7 +19,8 @@ class JacobianEstimator {
  public:
   JacobianEstimator(const JacobianEstimatorConfig& config, const Scales& scales, const ProbedModel& start);
 
-  /// An image taken at joints `q_then`, `interval_s` after the one before. False for an outlier, which is ignored.
+  /// An image taken at joints `q_then`, `interval_s` after the one before. False for an outlier, which is ignored,
+  /// unless reacquire_after of them in a row agree.
   bool update(const Eigen::Vector4d& q_then, const Eigen::Vector4d& features, const Eigen::Vector4d& ends_px,
               double interval_s);
 
@@ -36,7 +37,8 @@ class JacobianEstimator {
   Eigen::Vector4d q_;                       ///< q0
   Eigen::Matrix<double, 5, 8> parameters_;  ///< y0 and G^T, in scales
   Eigen::Matrix<double, 5, 5> covariance_;
-  int outliers_ = 0;
+  int outliers_ = 0;                                ///< in a row that agree with one another
+  ImageVector last_outlier_ = ImageVector::Zero();  ///< the last one's innovation
 };
 
 }  // namespace lapservo::internal

@@ -156,11 +156,13 @@ TEST_F(JacobianEstimatorOnTheWay, LearnsNoNoiseAtRest) {
 TEST_F(JacobianEstimatorOnTheWay, IgnoresAnOutlierButBelievesAStep) {
   for (int k = 0; k < 10; ++k) see();
   const FeatureState before = estimator->at(q);
-  Eigen::Vector4d far = before.features + Eigen::Vector4d(0, 50, 0, 0);
-  EXPECT_FALSE(estimator->update(q, far, before.ends_px, 1.0 / 60));
+  const auto off_px = [&](double r_px) {
+    return estimator->update(q, before.features + Eigen::Vector4d(0, r_px, 0, 0), before.ends_px, 1.0 / 60);
+  };
+  for (const double r_px : {50, -50, 60, -60, 70, -70}) EXPECT_FALSE(off_px(r_px)) << "no two of them agree";
   EXPECT_LT((estimator->at(q).features - before.features).norm(), 1e-9);
-  for (int k = 0; k < 5; ++k) estimator->update(q, far, before.ends_px, 1.0 / 60);
-  EXPECT_NEAR(estimator->at(q).features[1], far[1], 0.5);
+  for (int k = 0; k < 6; ++k) off_px(50);
+  EXPECT_NEAR(estimator->at(q).features[1], before.features[1] + 50, 0.5);
   EXPECT_LT(relative_error(estimator->at(q).jacobian, before.jacobian, scales), 0.05) << "the Jacobian stays";
 }
 
