@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,19 +15,24 @@ namespace lapservo::internal {
 /// instrument.
 class RegistrationWatch {
  public:
-  /// The observations of one frame. True: the endoscope moved some frames ago; said once.
-  bool add(const std::vector<Observation>& observations) {
+  /// The observations of one frame. How many frames ago a shaft missed the RCM first, those without it counted, where
+  /// the endoscope has moved; said once.
+  std::optional<int> add(const std::vector<Observation>& observations) {
     for (const Observation& observation : observations) add(observation);
-    const bool moved = std::any_of(seen_.begin(), seen_.end(), [](const auto& s) { return s.second.misses(); }) &&
-                       std::all_of(seen_.begin(), seen_.end(), [](const auto& s) { return s.second.silent(); });
-    if (moved) seen_.clear();
-    return moved;
+    std::optional<int> first;
+    for (const auto& [name, seen] : seen_) {
+      if (!seen.silent()) return std::nullopt;
+      if (seen.misses()) first = std::max(first.value_or(0), seen.since_first);
+    }
+    if (first) seen_.clear();
+    return first;
   }
   static constexpr int frames = 5;  ///< informative frames
 
  private:
   struct Seen {
     int passing = 0, missing = 0, absent = 0;  // frames in a row
+    int since_first = 0;                       // frames since the first of those that miss
     bool agreed = false;
     bool misses() const { return agreed && missing >= frames; }
     bool silent() const { return !agreed || missing >= frames || absent >= frames; }
@@ -35,6 +41,7 @@ class RegistrationWatch {
     Seen& seen = seen_[observation.instrument];
     const bool ok = observation.status == Status::ok, passes = ok && observation.rcm;
     seen.absent = ok ? 0 : seen.absent + 1;
+    seen.since_first = seen.missing > 0 ? seen.since_first + 1 : 0;
     if (!ok) return;
     seen.passing = passes ? seen.passing + 1 : 0;
     seen.missing = passes ? 0 : seen.missing + 1;

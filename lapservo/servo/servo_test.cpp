@@ -159,15 +159,16 @@ TEST(RegistrationWatch, SaysOnceThatShaftsMissTheRcmWhichTheyPassed) {
   passes.rcm = Observation::Rcm{};
   const auto frames = [](RegistrationWatch& watch, const std::vector<Observation>& observations, int count) {
     int said = 0;
-    for (int i = 0; i < count; ++i) said += watch.add(observations);
+    for (int i = 0; i < count; ++i) said += watch.add(observations).has_value();
     return said;
   };
   RegistrationWatch never;
   EXPECT_EQ(frames(never, {misses}, 50), 0);  // wrong all along: not moved
   RegistrationWatch watch;
-  EXPECT_EQ(frames(watch, {passes}, 20) + frames(watch, {lost}, 20) + frames(watch, {misses}, 4), 0);
-  EXPECT_EQ(frames(watch, {misses}, 50), 1);
-  EXPECT_EQ(frames(watch, {passes}, 20), 0);
+  EXPECT_EQ(frames(watch, {passes}, 20) + frames(watch, {misses}, 2) + frames(watch, {lost}, 30), 0);
+  EXPECT_EQ(frames(watch, {misses}, 2), 0);
+  EXPECT_EQ(watch.add(std::vector{misses}), 34) << "frames after the first, in all";
+  EXPECT_EQ(frames(watch, {misses}, 50) + frames(watch, {passes}, 20), 0);
   EXPECT_EQ(frames(watch, {misses}, 50), 1);
   // One of two: its own registration, not the endoscope.
   Observation other = passes;

@@ -249,11 +249,11 @@ struct Tally {
   }
 };
 
-void say_moved(const TrackOptions& options, const Frame& frame) {
+void say_moved(const TrackOptions& options, const Frame& frame, int frames_ago) {
   std::fprintf(stderr,
                "lapservo: %s: the endoscope moved: from %d frames before frame %d (%.2f s) on %s, and q is empty or "
                "off: %s\n",
-               options.input.c_str(), RegistrationWatch::frames - 1, frame.index, frame.time_s, misses_rcm_text,
+               options.input.c_str(), frames_ago, frame.index, frame.time_s, misses_rcm_text,
                measure_registration_text);
 }
 
@@ -376,7 +376,7 @@ class TrackRun {
             frame->flaw ? tracker.refuse(*frame->flaw) : tracker.track(frame->bgr, frame->time_s);
         tally_.add(observations);
         for (std::size_t i = 0; i < observations.size(); ++i) tip_frames_[i].add(observations[i], frame->time_s);
-        if (registration_.add(observations)) say_moved(options_, *frame);
+        if (const auto frames_ago = registration_.add(observations)) say_moved(options_, *frame, *frames_ago);
         lossy_ |= has_jpeg_extension(frame->file);
         diagnosis().add(frame->bgr, observations);
         if ((stopped_ = !pass_on(*frame, observations, came_s))) return;
