@@ -2,6 +2,7 @@
 // LAPSERVO_PAIR_SEED set how many of each kind (4; a fourth of them moving) and which (seed 1).
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <cstdio>
 #include <functional>
@@ -15,10 +16,12 @@
 #include "acceptance/frame_sets.h"
 #include "acceptance/random_print.h"
 #include "acceptance/tally.h"
+#include "lapservo/core/angles.h"
 #include "lapservo/core/random.h"
 #include "lapservo/sim/blood.h"
 #include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/tissue.h"
+#include "lapservo/testing/sample_frames.h"
 #include "lapservo/testing/scenes.h"
 
 namespace lapservo::acceptance {
@@ -247,6 +250,28 @@ TEST_F(Crossing, BothInstrumentsAreFound) {
 TEST_F(Crossing, BothAreFollowed) {
   const Sums sums = looked_at_all(true);
   EXPECT_GE(sums.exact.found_of_those, 0.6 * sums.exact.tell);
+}
+
+// Where the sides of both meet looks like the end of the one behind, who is found first: it is the rig's first.
+TEST(CrossingShafts, WhoIsFoundBeforeTheOneInFrontIsFittedAgain) {
+  Rig rig = load_rig(testing::source_folder() / "configs/example.yaml");
+  rig.instruments.push_back(rig.instruments[0]);
+  Instrument& front = rig.instruments[1];
+  front.name = "PSM2", front.marker.hues_deg = {210, 300, 60};
+  front.camera_from_rcm = Rigid3{Eigen::Quaterniond(-0.099733438577, 0.3694588619, 0.891952595138, 0.240777820035),
+                                 {0.077781746, -0.067215762, 0.059220278}};
+  const std::vector<ShaftPlacement> there{
+      placement_of(rig.instruments[0], {-0.1641038, 1.7301631, 0.1325724, 0.6178003}),
+      placement_of(front, {0.2389108, 1.4187707, 0.0751822, 2.6400651})};
+  Renderer renderer(rig.camera, shafts_of(rig), make_tissue(rig.camera.width_px, rig.camera.height_px, 9), {});
+  int found = 0;
+  for (std::uint64_t noise = 1; noise <= 6; ++noise) {
+    const Observation behind = Tracker(rig).track(renderer.render(there, noise))[0];
+    if (behind.status != Status::ok) continue;
+    ++found;
+    EXPECT_LT(std::abs(wrap_pi(behind.rcm.value().q.psi_rad - 0.6178003)), Observation::false_rad) << noise;
+  }
+  EXPECT_GE(found, 1) << "the test's own power";
 }
 
 }  // namespace

@@ -25,16 +25,15 @@ SurfaceTracker::SurfaceTracker(const Rig& rig, const TrackerOptions& options)
   }
   others_.reserve(tracked_.size());
   if (tracked_.size() > 1)
-    for (Tracked& it : tracked_) it.cover.reserve(rig.camera);
+    for (Tracked& it : tracked_) it.cover.reserve(rig.camera), it.beside.reserve(tracked_.size());
   BlurredEdges::instance();  // takes milliseconds, which no frame should
 }
 
 void SurfaceTracker::forget(std::size_t i) {
   Tracked& it = tracked_[i];
-  it.memory.reset();
+  it.memory.reset(), it.beside.clear();
   it.seen_before = {};
   it.search = MarkerSearch();
-  it.searched_beside = 0;
 }
 
 void SurfaceTracker::disregard_frame(std::size_t i) {
@@ -62,7 +61,7 @@ bool SurfaceTracker::remember(const ImageView& image) {
     const auto before = it.seen_before;
     it.seen_before = {fit ? fit->unknowns.pose() : it.found.refused, before[0]};
     if (!fit) continue;
-    it.memory = remembered(it.memory, *fit, it.found.among_others, now_s_);
+    it.memory = remembered(it.memory, *fit, !it.beside.empty(), now_s_);
     if (shows_two_moments(scene_of(image, it), *fit, before)) blended_s_ = now_s_;
   }
   return blended_s_ && now_s_ - *blended_s_ < two_moments_limits.told_for_s;
@@ -85,18 +84,35 @@ void SurfaceTracker::cover(Tracked& other, const ShaftPose& pose, WorkBudget& bu
   others_.push_back(&other.cover);
 }
 
-// Those that may hide or touch the one that is followed: where they were found in this frame, or are expected. Whether
-// there are any.
-bool SurfaceTracker::cover_expected(const Tracked& known, WorkBudget& budget) {
+// Those that may hide or touch it, found or expected; or only those that were found before it. Whether there are any.
+bool SurfaceTracker::cover_expected(const Tracked& known, WorkBudget& budget, bool only_before) {
+  const auto pose_of = [&](const Tracked& it) {
+    return it.found.fit ? it.found.fit->unknowns.pose() : it.memory->expected_pose(now_s_).pose();
+  };
+  const ShaftPose pose = pose_of(known);
+  others_.clear();
   for (Tracked& other : tracked_) {
-    if (&other == &known || !other.memory || !other.registration) continue;
-    const ShaftPose pose =
-        other.found.fit ? other.found.fit->unknowns.pose() : other.memory->expected_pose(now_s_).pose();
-    if (may_meet(rig_.camera, known.instrument.marker, known.memory->expected_pose(now_s_).pose(),
-                 other.instrument.marker, pose))
-      cover(other, pose, budget);
+    const bool has_pose = other.found.fit || (other.memory && !only_before);
+    if (&other == &known || !has_pose || !other.registration) continue;
+    const ShaftPose others = pose_of(other);
+    if (may_meet(rig_.camera, known.instrument.marker, pose, other.instrument.marker, others) &&
+        (!only_before || lies_before(others, known.instrument.marker, pose)))
+      cover(other, others, budget);
   }
   return !others_.empty();
+}
+
+// Fits again who was fitted without one that lies before it: where the sides of both meet looks like a boundary.
+void SurfaceTracker::fit_behind(const ImageView& image, const LightImage& light, WorkBudget& budget) {
+  for (Tracked& it : tracked_) {
+    if (!it.found.fit || !cover_expected(it, budget, true) || std::ranges::includes(it.beside, others_)) continue;
+    cover_expected(it, budget);
+    const Expected expected = it.memory ? it.memory->expected(now_s_) : Expected{};
+    it.found = follow(scene_of(image, it), light, it.found.fit->unknowns, expected, budget);
+    it.beside = others_;
+    if (!it.found.fit) it.beside.clear();  // it is looked for again
+    it.cover.clear(), next_frame_ = true;
+  }
 }
 
 // Those that were found, under or beside which the one that is looked for may be.
@@ -118,9 +134,8 @@ Found SurfaceTracker::follow_known(const ImageView& image, const LightImage& lig
                                    WorkBudget& budget) {
   const InstrumentMemory& memory = *known.memory;
   const auto follow_it = [&] {
-    Found found = follow(scene_of(image, known), light, memory.expected_pose(now_s_), memory.expected(now_s_), budget);
-    found.among_others = found.fit && !others_.empty();
-    return found;
+    known.beside = others_;
+    return follow(scene_of(image, known), light, memory.expected_pose(now_s_), memory.expected(now_s_), budget);
   };
   others_.clear();
   if (memory.among_others) cover_expected(known, budget);
@@ -138,10 +153,8 @@ bool SurfaceTracker::look_for_lost(const ImageView& image, const LightImage& lig
   for (Tracked& it : tracked_) {
     if (it.found.fit) continue;
     cover_found(it, blobs, budget);
-    const bool new_others = others_.size() != it.searched_beside;
-    it.searched_beside = others_.size();
-    if (new_others) it.search = MarkerSearch();
-    if (again && !new_others) continue;
+    if (again && others_ == it.beside) continue;
+    if (others_ != it.beside) it.search = MarkerSearch(), it.beside = others_;
     // Who was followed in vain, or took twice the work for it, has all of the next frame.
     const auto beyond = next_frame_ ? WorkBudget::Beyond::none : WorkBudget::Beyond::first;
     const double units = budget.left() / static_cast<double>(lost--) * (others_.empty() ? 1 : search_costs.part_beside);
@@ -149,7 +162,6 @@ bool SurfaceTracker::look_for_lost(const ImageView& image, const LightImage& lig
     it.found = budget.share(units, beyond, [&](WorkBudget& part) {
       return it.search.look({scene_of(image, it), light, others_.empty() ? blobs : parts}, part);
     });
-    it.found.among_others = it.found.fit && !others_.empty();
     any |= it.found.fit.has_value();
   }
   return any;
@@ -160,18 +172,22 @@ bool SurfaceTracker::look_for_lost(const ImageView& image, const LightImage& lig
 void SurfaceTracker::find(const ImageView& image, const LightImage& light, WorkBudget& budget) {
   for (Tracked& it : tracked_) it.cover.clear(), it.found = {};  // all, before one is followed beside the others
   bool lost = next_frame_ = false;
-  for (Tracked& it : tracked_) {
+  for (Tracked& it : tracked_)
     if (it.memory) it.found = follow_known(image, light, it, budget);
-    lost |= !it.found.fit;
-    next_frame_ |= it.memory && !it.found.fit;
+  fit_behind(image, light, budget);
+  for (Tracked& it : tracked_) {
+    if (it.found.fit) continue;
+    lost = true, next_frame_ |= it.memory.has_value();
+    it.memory.reset(), it.cover.clear();
   }
   if (!lost) return;
-  for (Tracked& it : tracked_)
-    if (!it.found.fit) it.memory.reset(), it.cover.clear();
   budget.spend(search_costs.blobs_per_px * image.width_px * image.height_px);
   const std::vector<Blob> blobs = largest_blobs(image, classes_);
-  bool more = look_for_lost(image, light, blobs, budget, false);
-  while (more && (options_.single || !options_.frame_budget)) more = look_for_lost(image, light, blobs, budget, true);
+  bool more = true;
+  for (std::size_t looks = 0; more && looks <= tracked_.size(); ++looks) {
+    more = look_for_lost(image, light, blobs, budget, looks > 0) && (options_.single || !options_.frame_budget);
+    fit_behind(image, light, budget);
+  }
 }
 
 Observation SurfaceTracker::observed(const ImageView& image, const Tracked& it, bool is_blended) const {

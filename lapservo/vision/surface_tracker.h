@@ -51,7 +51,7 @@ class SurfaceTracker {
     PrintRecord print{}, print_before{};                    // with this frame's evidence, and without it
     std::array<std::optional<ShaftPose>, 2> seen_before{};  // found or refused in the two frames before
     MarkerSearch search{};
-    std::size_t searched_beside = 0;  // so many others the search is among
+    std::vector<const ShaftCover*> beside{};  // others_ of its last fit or search
     Found found{};
     ShaftCover cover{};  // where somebody wanted it in this frame
   };
@@ -59,7 +59,8 @@ class SurfaceTracker {
   Found follow_known(const ImageView& image, const LightImage& light, Tracked& known, WorkBudget& budget);
   bool look_for_lost(const ImageView& image, const LightImage& light, const std::vector<Blob>& blobs,
                      WorkBudget& budget, bool again);
-  bool cover_expected(const Tracked& known, WorkBudget& budget);
+  bool cover_expected(const Tracked& known, WorkBudget& budget, bool only_before = false);
+  void fit_behind(const ImageView& image, const LightImage& light, WorkBudget& budget);
   void cover_found(const Tracked& lost, const std::vector<Blob>& blobs, WorkBudget& budget);
   void cover(Tracked& other, const ShaftPose& pose, WorkBudget& budget);
   bool remember(const ImageView& image);

@@ -30,11 +30,6 @@ void check_image(const cv::Mat& image, const Camera& camera) {
                      size_text(camera.width_px, camera.height_px) + " as in the rig");
 }
 
-const Rig& checked(const Rig& rig) {
-  check_rig(rig);
-  return rig;
-}
-
 TrackerOptions checked(TrackerOptions options) {
   if (options.frame_budget && !(*options.frame_budget > 0))
     throw InputError("tracker", "frame_budget", std::to_string(*options.frame_budget), "above 0, or none");
@@ -106,8 +101,10 @@ struct Tracker::State {
   std::vector<Observation> observations;
 };
 
-Tracker::Tracker(const Rig& rig, TrackerOptions options)
-    : state_(std::make_unique<State>(checked(rig), checked(options))) {}
+Tracker::Tracker(const Rig& rig, TrackerOptions options) {
+  check_rig(rig);
+  state_ = std::make_unique<State>(rig, checked(options));
+}
 Tracker::~Tracker() = default;
 Tracker::Tracker(Tracker&&) noexcept = default;
 Tracker& Tracker::operator=(Tracker&&) noexcept = default;

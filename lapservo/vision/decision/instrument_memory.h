@@ -60,7 +60,7 @@ struct InstrumentMemory {
   double time_s;
   FineFit fit;
   LookSchedule looks;
-  bool among_others = false;             ///< Found::among_others
+  bool among_others = false;             ///< it may touch or cross another instrument
   PoseVector step = PoseVector::Zero();  ///< of the unknowns, from the frame before
   double step_s = 0;                     ///< which took so long; 0 where none was found before
 

@@ -68,16 +68,13 @@ Value change_of(const Scene& scene, const Boundary& boundary, int pixels) {
   return seen[0].empty() ? Value::Zero() : Value(median(seen[0]), median(seen[1]), median(seen[2]));
 }
 
-double distance_px(const Eigen::Vector2d& from, const Eigen::Vector2d& to, const Eigen::Vector2d& raw_px) {
-  const Eigen::Vector2d way = to - from;
-  const double at = std::clamp((raw_px - from).dot(way) / way.squaredNorm(), 0.0, 1.0);
-  return (from + at * way - raw_px).norm();
-}
-
 bool is_near(const Boundaries& boundaries, const Eigen::Vector2d& raw_px, double reach_px) {
   for (const Boundary& boundary : boundaries)
-    for (std::size_t i = 1; i < boundary.size(); ++i)
-      if (distance_px(boundary[i - 1].raw_px, boundary[i].raw_px, raw_px) < reach_px) return true;
+    for (std::size_t i = 1; i < boundary.size(); ++i) {
+      const Eigen::Vector2d &from = boundary[i - 1].raw_px, way = boundary[i].raw_px - from;
+      const double at = std::clamp((raw_px - from).dot(way) / way.squaredNorm(), 0.0, 1.0);
+      if ((from + at * way - raw_px).norm() < reach_px) return true;
+    }
   return false;
 }
 

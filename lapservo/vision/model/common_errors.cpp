@@ -174,8 +174,7 @@ CommonErrors common_errors(const EdgeMeasurements& pass, const EdgeBlur& blur,
   // Causes that scatter points beyond their noise move whole boundaries and sides, too.
   const double unmodelled = std::max(1.0, scatter);
   for (std::size_t k = 0; k < 4; ++k) {
-    const bool corrected = processed && processed->bias_px[k];
-    const double left_px = (corrected ? fraction : 1) * bias_px[k];
+    const double left_px = (processed && processed->bias_px[k] ? fraction : 1) * bias_px[k];
     errors.px[k] = unmodelled * std::hypot(common_boundary_px(blur.along_px[k], radius_px),
                                            std::hypot(left_px, unexplained_px, departure_px[k]));
   }

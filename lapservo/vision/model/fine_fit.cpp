@@ -202,8 +202,7 @@ class Fitter {
     const auto all = known.then(*more);
     if (!all || !more->any()) return all.value_or(known);
     const DepartedLight without(light_, *all);
-    const auto left = processing_in(without.light());
-    return left.processing == Processing::none ? *all : known;
+    return processing_in(without.light()).processing == Processing::none ? *all : known;
   }
   void take_processing_off(const ProcessedEdges& edges) {
     fit_.bias_px = bias_magnitudes_px(edges);

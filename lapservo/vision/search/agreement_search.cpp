@@ -59,19 +59,6 @@ BandsAlong bands_of_whole_turn(const Marker& marker) {
   return all;
 }
 
-// By colour class, what bands it may be; 0 for what is none of them.
-auto bands_of_class(const Scene& scene) {
-  std::array<std::uint8_t, Scene::outside + 1> bands{};
-  for (std::size_t band = 3; band-- > 0;) bands[scene.bands[band]] = static_cast<std::uint8_t>(1 << band);
-  return bands;
-}
-
-// `here`: the bands that may show there; none beyond the marker's ends.
-double gain(const std::uint8_t* bgr, std::uint8_t seen, std::uint8_t here) {
-  const Shows shows = !seen ? grey_or_other(bgr) : seen & here ? Shows::its_band : Shows::another_band;
-  return colour_evidence.of(here ? Place::band : Place::shaft, shows);
-}
-
 double area_px2(const Scene& scene, const ShaftPose& pose) {
   const double length_m = scene.marker.length_m();
   const Eigen::Vector3d first = point_on_axis(pose, 0), last = point_on_axis(pose, length_m);
@@ -95,7 +82,8 @@ double explained_area_px2(const Scene& scene, const ShaftPose& pose, bool turned
   const double least_gain = above_px2 * (lines * places_along) / whole_px2;
   const Eigen::Vector3d step =
       pose.camera_from_unrolled.rotation * Eigen::Vector3d(0, 0, scene.marker.length_m() / places_along);
-  const auto band_of = bands_of_class(scene);
+  std::array<std::uint8_t, Scene::outside + 1> band_of{};  // by colour class, what bands it may be
+  for (std::size_t band = 3; band-- > 0;) band_of[scene.bands[band]] = static_cast<std::uint8_t>(1 << band);
   BandsAlong bands{};
   if (!turned) bands = bands_of_whole_turn(scene.marker);
   double gained = 0;
@@ -106,8 +94,13 @@ double explained_area_px2(const Scene& scene, const ShaftPose& pose, bool turned
     const Eigen::Vector3d base = point_on(pose, scene.marker, azimuth_rad, 0);
     const LineInImage<places_along + 2 * beyond> line(scene, base - beyond * step, step);
     for (std::size_t k = 0; k < places_along + 2 * beyond; ++k) {
+      // The bands that may show there; none beyond the marker's ends.
       const std::uint8_t here = k >= beyond && k < beyond + places_along ? bands[k - beyond] : 0;
-      if (const std::uint8_t* bgr = line.pixel(k, here != 0)) gained += gain(bgr, band_of[scene.classes(bgr)], here);
+      const std::uint8_t* const bgr = line.pixel(k, here != 0);
+      if (!bgr) continue;
+      const std::uint8_t seen = band_of[scene.classes(bgr)];
+      const Shows shows = !seen ? grey_or_other(bgr) : seen & here ? Shows::its_band : Shows::another_band;
+      gained += colour_evidence.of(here ? Place::band : Place::shaft, shows);
     }
   }
   if (gained + most_beside < least_gain) return no_area_px2;
@@ -178,8 +171,7 @@ bool AgreementSearch::move(const Scene& scene, Climb& climb, WorkBudget& budget)
 bool AgreementSearch::finish(const Scene& scene, Climb& climb, WorkBudget& budget) {
   while (climb.halvings < halvings) {
     if (!budget.allows(2 * tried_directions * search_costs.agreement)) return false;
-    const bool moved = move(scene, climb, budget);
-    if (moved && ++climb.moves < max_moves) continue;
+    if (move(scene, climb, budget) && ++climb.moves < max_moves) continue;
     ++climb.halvings, climb.moves = 0, climb.steps /= 2;
   }
   return true;

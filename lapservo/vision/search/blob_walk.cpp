@@ -27,8 +27,7 @@ std::vector<Pair> pair_up(const std::vector<Eigen::Vector2d>& places_px, const s
     }
   std::sort(all.begin(), all.end(), [](const Pair& a, const Pair& b) { return a.distance_px < b.distance_px; });
   for (const Pair& pair : all)
-    if (std::ranges::none_of(pairs,
-                             [&](const Pair& other) { return other.place == pair.place || other.blob == pair.blob; }))
+    if (std::ranges::none_of(pairs, [&](const Pair& p) { return p.place == pair.place || p.blob == pair.blob; }))
       pairs.push_back(pair);
   return pairs;
 }

@@ -150,8 +150,7 @@ std::optional<PoseUnknowns> stepped(const Scene& scene, const PoseUnknowns& unkn
                        side.raw_px, coarse_fit_limits.side_sigma_px, equations);
   }
   for (const BoundaryPoint& b : boundaries) {
-    const bool inner = b.boundary == 1 || b.boundary == 2;
-    if (inner && !with_rotation) continue;
+    if ((b.boundary == 1 || b.boundary == 2) && !with_rotation) continue;
     // For a rotation that is not known yet, ends lie in the middle of where they lie over the turn.
     const double tau_rad =
         with_rotation ? marker_azimuth_rad(scene.marker, b.azimuth_rad, pose.psi_rad) : scene.marker.covered_rad() / 2;

@@ -13,8 +13,6 @@ namespace {
 
 constexpr const SearchCosts& costs = search_costs;
 
-constexpr double rival_apart_radii = 1;  // two places nearer than this are one
-
 Found refusal(Status status, const PoseUnknowns& unknowns) {
   const ShaftPose& pose = unknowns.pose();
   const bool finite = pose.camera_from_unrolled.translation.allFinite() &&
@@ -129,26 +127,25 @@ Found detect(const SearchFrame& frame, bool through_rcm, BlobWalk& walk, WorkBud
   return best;
 }
 
-enum class Rival { none, found, not_known_yet };
-
 // Whether the marker shows in another place as well: a second print, a reflection, an image of tiles. The RCM would
-// show which is ours. All in one frame: in another one a rival may be where none was.
-Rival look_for_rival(const SearchFrame& frame, const FineFit& fit, WorkBudget& budget) {
+// show which is ours. Places within a radius are one. All in one frame: in another a rival may be where none was.
+// Nullopt where the budget ends first.
+std::optional<bool> has_rival(const SearchFrame& frame, const FineFit& fit, WorkBudget& budget) {
   const Scene& scene = frame.scene;
   const auto middle = [&](const PoseUnknowns& unknowns) {
     return scene.camera.raw_from_point(point_on_axis(unknowns.pose(), scene.marker.length_m() / 2));
   };
-  const double apart_px = rival_apart_radii * scene.marker.radius_m() /
-                          fit.unknowns.pose().camera_from_unrolled.translation.norm() * scene.camera.fx_px;
+  const double apart_px =
+      scene.marker.radius_m() / fit.unknowns.pose().camera_from_unrolled.translation.norm() * scene.camera.fx_px;
   for (const Blob& blob : frame.blobs)
     for (const PoseUnknowns& start : starts_in(frame, false, blob, budget).poses) {
       if ((middle(start) - middle(fit.unknowns)).norm() < apart_px) continue;
-      if (!budget.allows(costs.try_start())) return Rival::not_known_yet;
+      if (!budget.allows(costs.try_start())) return std::nullopt;
       const Found other = try_start(scene, frame.light, start, budget);
-      if (other.status == Status::marker_mismatch) return Rival::found;
-      if (other.fit && (middle(other.fit->unknowns) - middle(fit.unknowns)).norm() > apart_px) return Rival::found;
+      if (other.status == Status::marker_mismatch) return true;
+      if (other.fit && (middle(other.fit->unknowns) - middle(fit.unknowns)).norm() > apart_px) return true;
     }
-  return Rival::none;
+  return false;
 }
 
 }  // namespace
@@ -195,11 +192,11 @@ Found MarkerSearch::look_without_rcm(const SearchFrame& frame, WorkBudget& budge
     candidate_ = plain.fit;
   }
   if (waited) budget.allow(WorkBudget::Beyond::all);
-  const Rival rival = look_for_rival(frame, *candidate_, budget);
+  const std::optional<bool> rival = has_rival(frame, *candidate_, budget);
   Found found{Status::ambiguous, std::nullopt, std::nullopt};
-  if (rival == Rival::none) found = {Status::ok, std::move(candidate_), {}};
+  if (rival == false) found = {Status::ok, std::move(candidate_), {}};
   // A result says nothing of a later frame in which it is lost.
-  if (rival != Rival::not_known_yet) begin_anew(rival == Rival::none ? Status::no_marker : found.status);
+  if (rival) begin_anew(*rival ? found.status : Status::no_marker);
   return found;
 }
 

@@ -20,7 +20,6 @@ struct Found {
   Status status = Status::no_marker;
   std::optional<FineFit> fit;        ///< when ok
   std::optional<ShaftPose> refused;  ///< to draw, when there was something
-  bool among_others = false;         ///< it touches or crosses another instrument
 };
 
 /// A frame in which one marker is looked for. Borrows everything.

@@ -42,8 +42,6 @@ struct Line {
   double score = 0;
 };
 
-using Lines = std::vector<Line>;
-
 // Lines side by side that one shaft may show on.
 struct Window {
   std::size_t middle = 0, first = 0, last = 0;  // lines
@@ -54,7 +52,7 @@ struct Window {
 struct Fan {
   RaysFromPole rays;
   double first_alpha_rad, step_alpha_rad, first_beta_rad, step_beta_rad;
-  Lines lines{};
+  std::vector<Line> lines{};
   std::vector<Window> windows{};  // best first
   double alpha_rad(double line) const { return first_alpha_rad + line * step_alpha_rad; }
   double beta_rad(double sample) const { return first_beta_rad + sample * step_beta_rad; }
@@ -120,10 +118,8 @@ std::uint8_t class_on_ray(const Scene& scene, const Eigen::Vector3d& ray) {
 Line line_at(const Scene& scene, const RaysFromPole& rays, double alpha_rad, const Samples& samples) {
   const Eigen::Vector3d across = rays.across(alpha_rad);
   std::array<std::uint8_t, line_samples> classes;
-  for (std::size_t k = 0; k < line_samples; ++k) {
-    const Eigen::Vector3d ray = samples[k].x() * rays.pole + samples[k].y() * across;
-    classes[k] = class_on_ray(scene, ray);
-  }
+  for (std::size_t k = 0; k < line_samples; ++k)
+    classes[k] = class_on_ray(scene, samples[k].x() * rays.pole + samples[k].y() * across);
   Line line{segment_line(classes, scene.bands)};
   std::size_t state = 0;
   for (std::size_t k = 0; k < line_samples; ++k) {
@@ -146,7 +142,7 @@ Window window_about(const Scene& scene, const Fan& fan, std::size_t middle) {
   return window;
 }
 
-double most_score(const Lines& lines, const Window& window) {
+double most_score(const std::vector<Line>& lines, const Window& window) {
   double most = 0;
   for (std::size_t i = window.first; i <= window.last; ++i) most = std::max(most, lines[i].score);
   return most;
@@ -155,7 +151,7 @@ double most_score(const Lines& lines, const Window& window) {
 constexpr double least_share = 1.0 / 3;  // of the best line's score, for a line that shows the marker
 
 // A foreshortened marker is wider than by its length.
-Window grown(Window window, const Lines& lines) {
+Window grown(Window window, const std::vector<Line>& lines) {
   constexpr std::size_t most_apart = 3;
   const double least = least_share * most_score(lines, window);
   for (std::size_t i = window.first; i-- > 0 && window.first - i <= most_apart;)
@@ -198,11 +194,6 @@ std::optional<BandShares> shares_of(const LineSegmentation& split) {
   return shares;
 }
 
-// Where an end of the marker is by the lines that show it: the median of two or more, which is reordered.
-std::optional<double> agreed_end(std::vector<double>& places) {
-  return places.size() < 2 ? std::nullopt : std::optional(median(places));
-}
-
 // Whether nothing shows beside a line of the fan, by the image's border or another instrument, on most places from
 // first to last.
 bool is_hidden(const Scene& scene, const RaysFromPole& rays, double alpha_rad, double first_beta_rad,
@@ -217,7 +208,7 @@ bool is_hidden(const Scene& scene, const RaysFromPole& rays, double alpha_rad, d
 }
 
 Extent extent_of(const Scene& scene, const Fan& fan, const Window& window) {
-  const Lines& lines = fan.lines;
+  const std::vector<Line>& lines = fan.lines;
   const double most = most_score(lines, window);
   std::vector<double> first, last;
   double sum = 0, lowest = static_cast<double>(lines.size()), highest = 0;
@@ -231,6 +222,9 @@ Extent extent_of(const Scene& scene, const Fan& fan, const Window& window) {
     if (lines[i].split.seen[0]) first.push_back(fan.beta_rad(lines[i].split.position[0]));
     if (lines[i].split.seen[3]) last.push_back(fan.beta_rad(lines[i].split.position[3]));
   }
+  const auto agreed_end = [](std::vector<double>& places) {  // of two lines or more that show it
+    return places.size() < 2 ? std::nullopt : std::optional(median(places));
+  };
   Extent extent{fan.rays, fan.alpha_rad(sum / count), 0, agreed_end(first), agreed_end(last)};
   extent.other_bands = with_other_bands > (1 - few) * count;
   const Line& middle = lines[window.middle];
@@ -278,9 +272,8 @@ double distance_of(const Scene& scene, const Extent& extent, double first_beta_r
 }
 
 std::optional<PoseUnknowns> start_through_rcm(const Scene& scene, const Extent& extent, const Rigid3& camera_from_rcm) {
-  const double seen_squarely_rad = scene.marker.length_m() / distance_by_width_m(scene, extent);
-  const double first_beta_rad =
-      extent.first_beta_rad ? *extent.first_beta_rad : *extent.last_beta_rad - seen_squarely_rad;
+  const double shown_rad = scene.marker.length_m() / distance_by_width_m(scene, extent);  // seen squarely
+  const double first_beta_rad = extent.first_beta_rad ? *extent.first_beta_rad : *extent.last_beta_rad - shown_rad;
   const double distance_m = distance_of(scene, extent, first_beta_rad, camera_from_rcm.translation.norm());
   const double alpha_rad = alpha_of_axis(scene, extent, distance_m);
   const auto q = configuration_through(camera_from_rcm, distance_m * extent.rays.ray(alpha_rad, first_beta_rad));

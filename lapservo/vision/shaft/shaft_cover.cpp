@@ -159,6 +159,14 @@ bool may_meet(const Camera& camera, const Marker& marker, const ShaftPose& pose,
   return distance_px(*marked, *shaft) < radii_px + apart_px;
 }
 
+bool lies_before(const ShaftPose& other, const Marker& marker, const ShaftPose& pose) {
+  const Eigen::Vector3d from = point_on_axis(other, 0), way = point_on_axis(other, 1) - from;
+  return std::ranges::any_of(std::array{0.0, 0.5, 1.0}, [&](double part) {
+    const Eigen::Vector3d place = point_on_axis(pose, part * marker.length_m());
+    return (from + way.dot(place - from) * way).z() < place.z();
+  });
+}
+
 bool lies_beside(const Camera& camera, const Marker& others_marker, const ShaftPose& other, const Blob& blob,
                  const std::array<std::uint8_t, 3>& bands) {
   constexpr double beside_px = 24, doubt = 0.12;  // of the length, by which a leaning marker's ends bulge
@@ -173,10 +181,9 @@ bool lies_beside(const Camera& camera, const Marker& others_marker, const ShaftP
     if (std::find(bands.begin(), bands.end(), sample.colour) == bands.end()) continue;
     const auto ideal_px = camera.ideal_from_raw(Eigen::Vector2d(sample.u, sample.v));
     if (!ideal_px) continue;
-    const Eigen::Vector2d& place_px = *ideal_px;
-    const double away_px = distance_px(*shaft, place_px);
+    const double away_px = distance_px(*shaft, *ideal_px);
     if (away_px > radius_px + beside_px) continue;
-    const double at = (place_px - marked->from_px).dot(along_px) / (length_px * length_px);
+    const double at = (*ideal_px - marked->from_px).dot(along_px) / (length_px * length_px);
     const bool explained = at > -doubt && at < 1 + doubt && away_px < radius_px + blob_grid_px / 2.0;
     samples += !explained;
   }

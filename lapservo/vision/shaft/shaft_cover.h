@@ -79,6 +79,9 @@ class ShaftCover {
 bool may_meet(const Camera& camera, const Marker& marker, const ShaftPose& pose, const Marker& others_marker,
               const ShaftPose& other);
 
+/// Whether another's shaft is nearer to the camera than some of a marker, where it is nearest to that.
+bool lies_before(const ShaftPose& other, const Marker& marker, const ShaftPose& pose);
+
 /// Whether a blob shows colours of these bands under or beside another's shaft that its marker does not explain.
 bool lies_beside(const Camera& camera, const Marker& others_marker, const ShaftPose& other, const Blob& blob,
                  const std::array<std::uint8_t, 3>& bands);
