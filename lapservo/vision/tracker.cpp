@@ -7,8 +7,8 @@
 #include "lapservo/rig/check_rig.h"
 #include "lapservo/tool/wrist.h"
 #include "lapservo/vision/decision/fit_observation.h"
-#include "lapservo/vision/image/image_view.h"
 #include "lapservo/vision/image/interlacing.h"
+#include "lapservo/vision/image/light_image.h"
 #include "lapservo/vision/paper/centerline.h"
 #include "lapservo/vision/surface_tracker.h"
 

@@ -52,13 +52,14 @@ struct ChannelSteps {
   Channels gloss_px = Channels::Zero();  // by how much specular light and shading may move each
 };
 
-template <typename LightOf>
-ChannelSteps channel_steps(const StepColumns& columns, const LightOf& light_of) {
+// `raised`: a function of the samples' light.
+template <typename Raised>
+ChannelSteps channel_steps(const StepColumns& columns, const Raised& raised) {
   Channels step, density;
   for (std::size_t c = 0; c < 3; ++c) {
     float by_step = 0, by_density = 0;
     for (std::size_t i = columns.first; i <= columns.last; ++i) {
-      const float light = light_of(columns.edge.value[c][i]);
+      const float light = raised(columns.edge.value[c][i]);
       by_step += columns.step[i] * light, by_density += columns.density[i] * light;
     }
     const auto channel = static_cast<Eigen::Index>(c);
@@ -81,10 +82,9 @@ struct SeenBoundary {
   Channels by_exponent_px;            // d(offset)/d(exponent)
   int channels;                       // that show it
 
-  template <typename LightOf>
-  SeenBoundary(const StepColumns& columns, double of_radial_px, const LightOf& light_of)
+  SeenBoundary(const StepColumns& columns, double of_radial_px)
       : boundary(columns.edge.boundary), radial_px(of_radial_px) {
-    const ChannelSteps steps = channel_steps(columns, light_of);
+    const ChannelSteps steps = channel_steps(columns, std::identity());
     const Channels of_most = steps.step.abs() / steps.step.abs().maxCoeff();
     const Eigen::Array<bool, 3, 1> shown =
         of_most > believed.least_step && steps.offset_px.abs() < believed.farthest_px;
@@ -92,7 +92,7 @@ struct SeenBoundary {
         believed.floor_px * believed.floor_px + (believed.sigma_px / of_most).square() + steps.gloss_px.square();
     weight = shown.select(variance_px2.inverse(), 0);
     offset_px = shown.select(steps.offset_px, 0);
-    const auto raised = [&](float value) { return std::pow(light_of(value), 1 + believed.exponent_step); };
+    const auto raised = [](float light) { return std::pow(light, 1 + believed.exponent_step); };
     const Channels there_px = channel_steps(columns, raised).offset_px;
     by_exponent_px = (weight > 0).select((there_px - offset_px) / believed.exponent_step, 0);
     share = of_most.square() / of_most.square().sum();
@@ -153,15 +153,11 @@ Channels by_aberration_px(const SeenBoundary& boundary, int number) {
   return boundary.radial_px * Eigen::Vector3d::Unit(number == 0 ? 0 : 2).array();
 }
 
-// One that is not seen has what the worst of the others has.
 template <typename DoubtOf>
 std::array<double, 4> of_each_boundary(const SeenBoundaries& seen, const DoubtOf& doubt_of) {
-  double worst = 0;
-  for (const SeenBoundary& boundary : seen) worst = std::max(worst, doubt_of(boundary));
-  std::array<double, 4> doubts;
-  doubts.fill(worst);
+  std::array<std::optional<double>, 4> doubts;
   for (const SeenBoundary& boundary : seen) doubts[boundary.boundary] = doubt_of(boundary);
-  return doubts;
+  return magnitudes_px(doubts);
 }
 
 CameraDeparture by_aberration(const SeenBoundaries& seen, const Explanation<2>& explanation) {
@@ -180,27 +176,24 @@ CameraDeparture by_exponent(const SeenBoundaries& seen, const Explanation<1>& ex
   out.exponent = 1 - explanation.found[0];
   out.sigma_exponent = std::hypot(explanation.sigma[0], believed.doubted_of_response * explanation.found[0]);
   out.doubt_of_response_px = of_each_boundary(seen, [&](const SeenBoundary& boundary) {
-    return std::abs(out.sigma_exponent * (boundary.share * boundary.by_exponent_px).sum());
+    return out.sigma_exponent * (boundary.share * boundary.by_exponent_px).sum();
   });
   return out;
 }
 
-template <typename LightOf>
-SeenBoundaries seen_in(const ChannelGeometry& channels, const PooledEdges& edges, double blur_px,
-                       const LightOf& light_of) {
-  const Eigen::Vector2f centre(channels.centre_u, channels.centre_v);
+// `edges`: in light.
+SeenBoundaries seen_in(const ChannelGeometry& channels, const PooledEdges& edges, double blur_px) {
   SeenBoundaries seen;
   for (const PooledEdge& edge : edges.all) {
     if (!edge.is_seen()) continue;
-    const double radial_px = static_cast<double>((edge.place_px - centre).dot(edge.normal));
-    const SeenBoundary boundary(StepColumns(edge, static_cast<float>(blur_px)), radial_px, light_of);
+    const double radial_px = static_cast<double>((edge.place_px - channels.centre()).dot(edge.normal));
+    const SeenBoundary boundary(StepColumns(edge, static_cast<float>(blur_px)), radial_px);
     if (boundary.channels > 1) seen.push_back(boundary);
   }
   return seen;
 }
 
-// Specular light beside one boundary looks like another response there; a camera's shows at all: most of it without any
-// of them.
+// Specular light beside one boundary looks like another response there; a camera's shows without any one of them.
 bool is_at_more_than_one(const SeenBoundaries& seen, double exponent) {
   return std::all_of(seen.begin(), seen.end(), [&](const SeenBoundary& left_out) {
     double information = 1 / (believed.usual_exponent * believed.usual_exponent), gradient = 0;
@@ -253,11 +246,13 @@ std::optional<CameraDeparture> find_departure(const LightImage& light, std::span
     const auto i = static_cast<std::size_t>(place);
     return table[i] + (place - static_cast<float>(i)) * (table[i + 1] - table[i]);
   };
-  const PooledEdges glance = pool_edges(light, measurements, Look::glance);
-  if (!Disagreement(seen_in(channels, glance, blur_px, light_of)).is_plain()) return std::nullopt;
+  PooledEdges glance = pool_edges(light, measurements, Look::glance);
+  for (PooledEdge& edge : glance.all)
+    for (auto& channel : edge.value) std::ranges::transform(channel, channel.begin(), light_of);
+  if (!Disagreement(seen_in(channels, glance, blur_px)).is_plain()) return std::nullopt;
   // Means of values have dark edges, which look like another response.
   const PooledEdges edges = pool_edges(light, measurements, Look::light);
-  const SeenBoundaries seen = seen_in(channels, edges, blur_px, std::identity());
+  const SeenBoundaries seen = seen_in(channels, edges, blur_px);
   const Disagreement all(seen);
   if (!all.is_plain()) return std::nullopt;
   auto aberration = explained<2>(seen, all, believed.usual_aberration, believed.told_of_scatter, by_aberration_px);
@@ -280,7 +275,7 @@ std::array<double, 4> moved_by_exponent_px(const LightImage& light, std::span<co
                                            double blur_px) {
   const PooledEdges edges = pool_edges(light, measurements, Look::light);
   std::array<double, 4> moved_px{};
-  for (const SeenBoundary& seen : seen_in(light.channels(), edges, blur_px, std::identity()))
+  for (const SeenBoundary& seen : seen_in(light.channels(), edges, blur_px))
     moved_px[seen.boundary] = (seen.share * seen.by_exponent_px).sum();
   return moved_px;
 }

@@ -41,8 +41,7 @@ struct DepartureLimits {
 };
 inline constexpr DepartureLimits departure_limits;
 
-/// Effects of a camera that the rig's camera does not have, as frames show them. A magnification that may be there or
-/// not is only the sigma.
+/// Effects that the rig's camera does not have, as frames show them. A magnification that may be there is only a sigma.
 struct CameraDeparture {
   ChromaticAberration aberration = {}, sigma_aberration{0, 0};  ///< times the rig's
   double exponent = 1, sigma_exponent = 0;                      ///< light is the rig's to this power
@@ -50,8 +49,6 @@ struct CameraDeparture {
   /// the principal point along its normal; and of the response [px].
   std::array<double, 4> doubt_of_radial{}, doubt_of_response_px{};
 
-  /// Whether any of it is uncertain.
-  bool doubted() const { return sigma_exponent != 0 || sigma_aberration != ChromaticAberration{0, 0}; }
   bool any() const { return exponent != 1 || aberration != ChromaticAberration{}; }
   /// Whether edges are seen at the same places through both.
   bool moves_alike(const CameraDeparture& other) const {

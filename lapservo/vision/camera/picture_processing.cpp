@@ -19,13 +19,13 @@ struct State {
 };
 
 // One sigma of what is expected of any processing before a frame is seen.
-ProcessingVector expected_sigmas(bool only_video) {
-  constexpr double as_expected = 1e-3;
+constexpr double as_expected = 1e-3;
+ProcessingVector expected_sigmas(bool only_video, double of_chroma_shift_px = as_expected) {
   ProcessingVector sigmas;
   using enum ProcessingUnknown::Index;
   sigmas[log_blur] = 0.3, sigmas[log_mosaic] = 0.2, sigmas[chroma_variance] = 0.7;
   sigmas[saturation] = 0.15, sigmas[sharpening] = 0.5, sigmas[log_radius] = 0.25;
-  sigmas[chroma_shift_px] = as_expected;
+  sigmas[chroma_shift_px] = of_chroma_shift_px;
   if (only_video) sigmas[log_mosaic] = sigmas[saturation] = sigmas[sharpening] = as_expected;
   return sigmas;
 }
@@ -269,8 +269,7 @@ std::optional<ProcessedEdges> explain(const LightTable& light_of_value, const Po
   // From where the image is expected to be, the way to the least cost may end beside it.
   if (problem.cost(none) < problem.cost(state)) state = minimised(problem, none);
   if (processing_of(state.processing).chroma_variance_px2 > processing_limits.chroma_variance_px2) {
-    ProcessingVector sigmas_beside = sigmas;
-    sigmas_beside[ProcessingUnknown::chroma_shift_px] = chroma_beside_px;
+    const ProcessingVector sigmas_beside = expected_sigmas(expected.only_video, chroma_beside_px);
     const State anywhere = minimised(Problem(light_of_value, edges, blur_px, sigmas_beside, expected), state);
     const double shift_px = likely_shift_px(processing_of(anywhere.processing).chroma_shift_px);
     state = minimised(Problem(light_of_value, edges, blur_px, sigmas, expected, shift_px), anywhere);
@@ -295,14 +294,6 @@ std::optional<ProcessedEdges> explain(const LightTable& light_of_value, const Po
     if (const std::uint8_t k = edges.of_measurement[i]; k != PooledEdges::nowhere)
       out.measurement_bias_px[i] = static_cast<float>(bias_px(k));
   return out;
-}
-
-std::array<double, 4> bias_magnitudes_px(const ProcessedEdges& edges) {
-  double largest_px = 0;
-  for (const auto& bias_px : edges.bias_px) largest_px = std::max(largest_px, std::abs(bias_px.value_or(0)));
-  std::array<double, 4> magnitudes_px{};
-  for (std::size_t k = 0; k < 4; ++k) magnitudes_px[k] = std::abs(edges.bias_px[k].value_or(largest_px));
-  return magnitudes_px;
 }
 
 ProcessingEvidence find_processing(const LightImage& light, std::span<const Measurement> measurements, double blur_px,

@@ -59,9 +59,6 @@ std::optional<ProcessedEdges> explain(const LightTable& light_of_value, const Po
 /// Whether the frame looks like that rather than like none.
 bool is_believed(const ProcessedEdges& edges);
 
-/// How much each boundary may be mislocated: one that was not seen well by as much as the worst of the others.
-std::array<double, 4> bias_magnitudes_px(const ProcessedEdges& edges);
-
 /// Whether the camera did more to an image than its response says. Unknown where the image can't show it: blurred
 /// widely, too little seen, or unlike any processing that is known here.
 enum class Processing { unknown, none, found };

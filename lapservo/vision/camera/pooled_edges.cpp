@@ -153,4 +153,12 @@ PooledEdges pool_edges(const LightImage& light, std::span<const Measurement> mea
   return edges;
 }
 
+std::array<double, 4> magnitudes_px(const std::array<std::optional<double>, 4>& seen_px) {
+  double worst_px = 0;
+  for (const auto& px : seen_px) worst_px = std::max(worst_px, std::abs(px.value_or(0)));
+  std::array<double, 4> out;
+  std::ranges::transform(seen_px, out.begin(), [&](const auto& px) { return std::abs(px.value_or(worst_px)); });
+  return out;
+}
+
 }  // namespace lapservo::internal

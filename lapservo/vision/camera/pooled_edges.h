@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include "lapservo/core/inplace_vector.h"
@@ -39,13 +40,15 @@ struct PooledEdges {
   PooledEdges() { of_measurement.fill(nowhere); }
 };
 
-/// The values between pixels, and their average: at a glance some places' encoded values along straight lines, which
-/// darken what is bright beside an edge, where encoded light bends, for an eighth of the time; closely, those of all
-/// places, by brightness and cubic; or light along straight lines, as fit_step does, which averages without a bias but
-/// is no value that a camera's filters worked on.
+/// The averaged values: at a glance some places' encoded values, linear between pixels, which darkens what is bright
+/// beside an edge, for an eighth of the time; closely, those of all places, cubic and by brightness; or light, linear
+/// as in fit_step, which has no bias but is no value that a camera's filters worked on.
 enum class Look { glance, closely, light };
 
 /// For the boundaries among `measurements`.
 PooledEdges pool_edges(const LightImage& light, std::span<const Measurement> measurements, Look look);
+
+/// How far each boundary may be moved, of those that were seen well: one that was not by as much as the worst of them.
+std::array<double, 4> magnitudes_px(const std::array<std::optional<double>, 4>& seen_px);
 
 }  // namespace lapservo::internal

@@ -11,7 +11,6 @@
 #include <Eigen/Geometry>
 
 namespace lapservo::internal {
-
 namespace {
 
 // Classes of the grid's samples, framed by cells without colour, so that a cell's neighbourhood always exists.

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "lapservo/vision/colour/colour_classes.h"
-#include "lapservo/vision/image/image_view.h"
+#include "lapservo/vision/image/light_image.h"
 
 namespace lapservo::internal {
 
@@ -20,12 +20,10 @@ struct Blob {
   std::vector<Sample> samples;
 };
 
-/// As many as detection looks at: first those of two colours and more, largest first. Touches one pixel in
-/// blob_grid_px^2 only.
+/// As many as detection looks at: first those of two colours and more, largest first. Reads only the grid's pixels.
 std::vector<Blob> largest_blobs(const ImageView& image, const ColourClasses& classes);
 
-/// The same, but as one those that blood may have parted: nearer to one another than half of what the larger one
-/// reaches over.
+/// Those that blood may have parted as one: nearer to one another than half of what the larger one reaches over.
 std::vector<Blob> joined_blobs(const std::vector<Blob>& blobs);
 
 }  // namespace lapservo::internal

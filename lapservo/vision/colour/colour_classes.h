@@ -25,8 +25,7 @@ std::optional<double> hue_deg_of(double b, double g, double r);
 
 /// Which of the markers' colours a pixel has: 0 for none, else 1, 2, ... for the rig's distinct hues. A pixel has a
 /// colour when it is colourful and its HSV hue lies nearer to one of its hues than half the way to another colour's, so
-/// that exposure, shading and moderate white balance need no tuning. Looked up from the 5 high bits of each channel: 32
-/// KiB.
+/// that exposure, shading and moderate white balance need no tuning. Looked up by the high bits of each channel.
 class ColourClasses {
  public:
   explicit ColourClasses(const std::vector<Instrument>& instruments);

@@ -64,8 +64,7 @@ class ColourEvidence {
 };
 inline const ColourEvidence colour_evidence;
 
-/// Gain of a pixel of a section across the shaft, for the part of it that is the marker: evidence for a band against
-/// what is beside the shaft.
+/// Gain of a pixel of a section across the shaft: evidence for a band against what is beside the shaft.
 inline double section_gain(bool is_ours) {
   static const double unit =
       colour_evidence.of(Place::band, Shows::its_band) - colour_evidence.of(Place::beside, Shows::its_band);

@@ -6,9 +6,8 @@
 
 namespace lapservo::internal {
 
-/// Edges as a Gaussian blur of one pixel sigma leaves them, at a distance u from the edge in sigmas (inside: u > 0):
-/// the convolution of the normal density with the step, the square root and the 3/2 power of max(0, u). The last two
-/// make the occluding contour of a shaded cylinder.
+/// Blurred edges at a distance u in sigmas (inside: u > 0): the convolution of the normal density with the step and,
+/// for the occluding contour of a shaded cylinder, with the square root and the 3/2 power of max(0, u).
 struct BlurredEdge {
   float density, step, root, three_halves;
   float root_slope;  ///< d(root)/du

@@ -15,8 +15,7 @@ namespace lapservo::internal {
 inline constexpr double usual_blur_px = 1.2;
 
 struct BlurLimits {
-  /// The sharpest lens's. A lens's blur beyond it makes the correlation smaller, which is fitted; nothing makes it
-  /// larger than 1.
+  /// The sharpest lens's. A lens's blur beyond it makes the correlation, which is fitted, smaller.
   double lens_blur_px = 0.8;
   /// Limits of a blur, and by how much a pass may change it: wider is no edge, and far steps overshoot.
   double min_blur_px = 0.5, max_blur_px = 8, min_blur_change = 0.6, max_blur_change = 1.7;
@@ -47,8 +46,7 @@ inline double moved_by_blur_px(const BoundaryCourse& course, const BlurEllipse& 
 }
 
 /// Width of the blur (one sigma) of each boundary along the shaft and of the sides across it: that of a lens and of a
-/// motion within the exposure. Turns about whatever axis move each boundary by another length. Carried from frame to
-/// frame.
+/// motion within the exposure, which moves each boundary by another length. Carried from frame to frame.
 struct EdgeBlur {
   std::array<double, 4> along_px;
   double sides_px;
@@ -78,18 +76,16 @@ struct BlurEvidence {
 /// Evidence of the boundaries about the blur: they are not all inclined alike.
 class EllipseEvidence {
  public:
-  /// A point of a boundary that was located along the shaft with this blur, its normal's parts along the shaft and
-  /// across it.
+  /// A point of a boundary that was located along the shaft with this blur; its normal along the shaft and across it.
   void add(const EdgeFit& edge, double variance, const EdgeBlur& blur, std::size_t boundary,
            const Eigen::Vector2d& normal);
   /// The blur after a Gauss-Newton step of limited size; the sides' as it is.
   EdgeBlur improved(const EdgeBlur& blur) const;
 
-  /// The boundaries' blurs along the shaft after the whole step, squared [px^2], and their covariance [px^4], whatever
-  /// the correlation is.
+  /// The boundaries' squared blurs along the shaft after the whole step and their covariance, at any correlation.
   struct Squares {
     Eigen::Vector4d px2;
-    Eigen::Matrix4d covariance;
+    Eigen::Matrix4d covariance;  // px^4
   };
   Squares squares(const EdgeBlur& blur) const;
 

@@ -7,8 +7,7 @@
 
 #include "lapservo/vision/edges/blurred_edges.h"
 
-// All up to HWY_ONCE is compiled once for every instruction set that differs much from the others and whose vectors may
-// stand in arrays.
+// All up to HWY_ONCE is compiled for each instruction set that differs much and whose vectors may stand in arrays.
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "lapservo/vision/edges/edge_lines.cpp"
@@ -167,10 +166,9 @@ HWY_INLINE BlurredLanes blurred_at(const BlurredEdge* table, V u) {
   return edge;
 }
 
-// The dot products of columns with one, which is read once.
+// The dot products of `Count` columns with one, which is read once.
 template <std::size_t Count>
-HWY_INLINE std::array<V, Count> dots(const std::array<Column, Count>& columns, const Column& with,
-                                     std::size_t samples) {
+HWY_INLINE std::array<V, Count> dots(const Column* columns, const Column& with, std::size_t samples) {
   std::array<V, Count> sums;
   sums.fill(hn::Zero(Floats()));
   for (std::size_t i = 0; i < samples; ++i) {
@@ -181,19 +179,16 @@ HWY_INLINE std::array<V, Count> dots(const std::array<Column, Count>& columns, c
 }
 
 HWY_INLINE V dot(const Column& a, const Column& b, std::size_t samples) {
-  V sum = hn::Zero(Floats());
-  for (std::size_t i = 0; i < samples; ++i) sum = hn::MulAdd(a[i].load(), b[i].load(), sum);
-  return sum;
+  return dots<1>(&a, b, samples)[0];
 }
 
 // The model's linear basis, a constant and then the shapes, made orthonormal; and the shapes' derivatives by the edge's
-// position and then by the blur, with the Gram matrix of what the basis can't imitate of them. Common to the three
-// channels.
+// position and then by the blur, with the Gram matrix of what the basis can't imitate of them. For all channels.
 template <std::size_t Shapes>
 struct Basis {
-  static constexpr std::size_t linear = Shapes + 1, derivatives = 2 * Shapes;
+  static constexpr std::size_t linear = Shapes + 1, derivatives = 2 * Shapes, all = linear + derivatives;
 
-  std::array<Column, linear + derivatives> columns;
+  std::array<Column, all> columns;
   std::array<std::array<V, linear>, linear> triangle;       // of the orthogonalisation
   std::array<std::array<V, linear>, derivatives> imitated;  // of each derivative, along each unit
   std::array<std::array<V, derivatives>, derivatives> gram;
@@ -203,7 +198,7 @@ struct Basis {
     fill(lines, present, edge_px);
     orthogonalise(lines, present);
     for (std::size_t s = 0; s < derivatives; ++s) {
-      const auto products = dots(columns, columns[linear + s], lines.samples);
+      const auto products = dots<all>(columns.data(), columns[linear + s], lines.samples);
       std::copy_n(products.begin(), linear, imitated[s].begin());
       for (std::size_t r = 0; r <= s; ++r) {
         V left = products[linear + r];
@@ -276,8 +271,7 @@ struct FitLanes {
   Mask converged;
 };
 
-// One variable-projection step: linear amplitudes per channel, then the position in what they leave. `squares`: the sum
-// of the light's.
+// The step of edge_profile.cpp. `squares`: the sum of the light's.
 template <std::size_t Shapes>
 FitLanes project(const LineLanes& lines, const std::array<Column, 3>& light, V squares, const Column& present,
                  V edge_px) {
@@ -291,7 +285,7 @@ FitLanes project(const LineLanes& lines, const std::array<Column, 3>& light, V s
   std::array<V, 2> gradient{zero, zero};
   std::array<std::array<V, 2>, 2> information{gradient, gradient};
   for (std::size_t c = 0; c < 3; ++c) {
-    const auto products = dots(basis.columns, light[c], lines.samples);
+    const auto products = dots<Basis<Shapes>::all>(basis.columns.data(), light[c], lines.samples);
     std::array<V, linear> amplitude;
     for (std::size_t j = 0; j < linear; ++j) {
       amplitude[j] = products[j];
@@ -380,28 +374,24 @@ void locate(const LightImage& image, std::span<const EdgeLine> lines, int iterat
   converged.store(hn::IfThenElseZero(fit.converged, hn::Set(d, 1)));
   for (std::size_t j = 0; j < lines.size(); ++j) {
     if (sampled.brightest.value[j] >= LightImage::saturated_value) {
-      fits.push_back(locate_edge(image, lines[j], Shapes == 1 ? EdgeKind::step : EdgeKind::contour, iterations));
+      fits.push_back(locate_edge(image, lines[j], iterations));
       continue;
     }
     const auto of = [&](FitLanes::Value value, std::size_t c = 0) { return values[value + c].value[j]; };
+    const auto bgr_of = [&](FitLanes::Value value) { return std::array{of(value), of(value, 1), of(value, 2)}; };
     using enum FitLanes::Value;
-    fits.push_back({converged.value[j] > 0,
-                    of(offset),
-                    of(information),
-                    of(residual_variance),
-                    {of(step), of(step, 1), of(step, 2)},
-                    {of(before), of(before, 1), of(before, 2)},
-                    of(blur_gradient),
-                    of(blur_information)});
+    fits.push_back({converged.value[j] > 0, of(offset), of(information), of(residual_variance), bgr_of(step),
+                    bgr_of(before), of(blur_gradient), of(blur_information)});
   }
 }
 
-EdgeFits locate_edges(const LightImage& image, std::span<const EdgeLine> lines, EdgeKind kind, int iterations) {
+EdgeFits locate_edges(const LightImage& image, std::span<const EdgeLine> lines, int iterations) {
   EdgeFits fits;
   const std::size_t lanes = hn::Lanes(Floats());
   for (std::size_t i = 0; i < lines.size(); i += lanes) {
     const auto some = lines.subspan(i, std::min(lanes, lines.size() - i));
-    kind == EdgeKind::step ? locate<1>(image, some, iterations, fits) : locate<2>(image, some, iterations, fits);
+    lines[0].contour_radius_px > 0 ? locate<2>(image, some, iterations, fits)
+                                   : locate<1>(image, some, iterations, fits);
   }
   return fits;
 }
@@ -415,7 +405,7 @@ namespace lapservo::internal {
 
 HWY_EXPORT(locate_edges);
 
-EdgeFit locate_edge(const LightImage& light, const EdgeLine& line, EdgeKind kind, int iterations) {
+EdgeFit locate_edge(const LightImage& light, const EdgeLine& line, int iterations) {
   EdgeProfile profile;
   profile.first_px = static_cast<float>(-line.before);
   profile.count = static_cast<std::size_t>(line.before + line.after + 1);
@@ -427,12 +417,12 @@ EdgeFit locate_edge(const LightImage& light, const EdgeLine& line, EdgeKind kind
       profile.usable[c][i] = !sample.saturated[c];
     }
   }
-  return kind == EdgeKind::step ? fit_step(profile, line.blur_px, iterations)
-                                : fit_contour(profile, line.blur_px, line.contour_radius_px, iterations);
+  return line.contour_radius_px > 0 ? fit_contour(profile, line.blur_px, line.contour_radius_px, iterations)
+                                    : fit_step(profile, line.blur_px, iterations);
 }
 
-EdgeFits locate_edges(const LightImage& light, std::span<const EdgeLine> lines, EdgeKind kind, int iterations) {
-  return HWY_DYNAMIC_DISPATCH(locate_edges)(light, lines, kind, iterations);
+EdgeFits locate_edges(const LightImage& light, std::span<const EdgeLine> lines, int iterations) {
+  return HWY_DYNAMIC_DISPATCH(locate_edges)(light, lines, iterations);
 }
 
 }  // namespace lapservo::internal

@@ -52,7 +52,7 @@ std::vector<EdgeLine> random_lines(std::size_t count, bool contour, std::uint64_
     line.before = static_cast<int>(random.uniform(4, 9));
     line.after = static_cast<int>(random.uniform(contour ? 9 : 4, contour ? 16 : 10));
     line.blur_px = static_cast<float>(random.uniform(1, 1.5) / cosine);
-    line.contour_radius_px = static_cast<float>(radius_px / cosine);
+    if (contour) line.contour_radius_px = static_cast<float>(radius_px / cosine);
     lines.push_back(line);
   }
   return lines;
@@ -84,15 +84,7 @@ void on_every_target(const Check& check) {
   hwy::GetChosenTarget().Update(hwy::SupportedTargets());
 }
 
-class EdgeLines : public ::testing::TestWithParam<bool> {
- protected:
-  EdgeFits together(const LightImage& light, std::span<const EdgeLine> lines, int iterations) const {
-    return locate_edges(light, lines, GetParam() ? EdgeKind::contour : EdgeKind::step, iterations);
-  }
-  EdgeFit alone(const LightImage& light, const EdgeLine& line, int iterations) const {
-    return locate_edge(light, line, GetParam() ? EdgeKind::contour : EdgeKind::step, iterations);
-  }
-};
+class EdgeLines : public ::testing::TestWithParam<bool> {};
 
 TEST_P(EdgeLines, TogetherAreAsOneByOneOnEveryProcessor) {
   const auto table = Response{}.table();
@@ -110,11 +102,11 @@ TEST_P(EdgeLines, TogetherAreAsOneByOneOnEveryProcessor) {
         for (const int iterations : {1, 3}) {
           const auto lines = random_lines(count, GetParam(), seed + 100 * count);
           on_every_target([&] {
-            const EdgeFits fits = together(light, lines, iterations);
+            const EdgeFits fits = locate_edges(light, lines, iterations);
             ASSERT_EQ(fits.size(), count);
             for (std::size_t i = 0; i < count; ++i) {
               SCOPED_TRACE("line " + std::to_string(i));
-              expect_same(alone(light, lines[i], iterations), fits[i]);
+              expect_same(locate_edge(light, lines[i], iterations), fits[i]);
               ++located, converged += fits[i].converged;
             }
           });
@@ -130,7 +122,7 @@ TEST_P(EdgeLines, NothingIsLocatedWhereNothingIs) {
     const ImageView view(flat);
     const LightImage light(view, table);
     on_every_target([&] {
-      for (const EdgeFit& fit : together(light, random_lines(20, GetParam(), 3), 3)) EXPECT_FALSE(fit.converged);
+      for (const EdgeFit& fit : locate_edges(light, random_lines(20, GetParam(), 3), 3)) EXPECT_FALSE(fit.converged);
     });
   }
 }
@@ -141,9 +133,9 @@ TEST_P(EdgeLines, MayReachTheImagesCorner) {
   const cv::Mat image = picture(GetParam(), 1);
   const ImageView view(image);
   const LightImage light(view, table);
-  const EdgeLine line{
-      .u_px = 118.98F, .v_px = 98.98F, .before = 8, .after = 20, .blur_px = 1.2F, .contour_radius_px = 45};
-  on_every_target([&] { EXPECT_EQ(together(light, {&line, 1}, 2).size(), 1); });
+  EdgeLine line{.u_px = 118.98F, .v_px = 98.98F, .before = 8, .after = 20, .blur_px = 1.2F};
+  if (GetParam()) line.contour_radius_px = 45;
+  on_every_target([&] { EXPECT_EQ(locate_edges(light, {&line, 1}, 2).size(), 1); });
 }
 
 INSTANTIATE_TEST_SUITE_P(Shapes, EdgeLines, ::testing::Bool(),

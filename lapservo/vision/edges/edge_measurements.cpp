@@ -56,15 +56,16 @@ struct Frame {
     return {turned(-1), generatrix(azimuth_rad, x, y), turned(1)};
   }
   Eigen::Vector3d point(const Generatrix& line, double along_m) const { return line.begin + along_m * axes.col(2); }
+  Eigen::Vector3d to_camera_from(const Generatrix& line, double along_m) const {
+    return camera_in_unrolled - marker().radius_m() * line.outwards_unrolled - Eigen::Vector3d(0, 0, along_m);
+  }
   Facing facing(std::size_t k, const Generatrix& line, double along_m) const {
-    Eigen::Vector3d to_camera = camera_in_unrolled - marker().radius_m() * line.outwards_unrolled;
-    to_camera.z() -= along_m;
+    const Eigen::Vector3d to_camera = to_camera_from(line, along_m);
     const double beyond_m = k == 0 ? -to_camera.z() : k == 3 ? to_camera.z() : 0, per_m = 1 / to_camera.norm();
     return {line.outwards_unrolled.dot(to_camera) * per_m, std::max(0.0, beyond_m * per_m)};
   }
   double diffuse_light(const Generatrix& line, double along_m) const {
-    Eigen::Vector3d to_camera = camera_in_unrolled - marker().radius_m() * line.outwards_unrolled;
-    to_camera.z() -= along_m;
+    const Eigen::Vector3d to_camera = to_camera_from(line, along_m);
     const double ambient = edge_limits.blurred_ambient_fraction;
     return ambient + (1 - ambient) * std::max(0.0, line.outwards_unrolled.dot(to_camera) / to_camera.norm());
   }
@@ -129,8 +130,7 @@ struct BoundaryPlace {
   bool shows_film() const { return facing.film_edge > 0; }
 };
 
-// Whether the pixels on both sides have the colours that should be there. A blurred band tints the shaft beyond its
-// end.
+// Whether both sides have the colours that should be there. A blurred band tints the shaft beyond its end.
 bool colours_agree(const Frame& frame, const BoundaryPlace& place) {
   const std::size_t k = place.measurement.group;
   const Eigen::Vector2d at_px = place.point_px + static_cast<double>(place.edge.offset_px) * place.along;
@@ -319,7 +319,7 @@ void measure_boundaries(const Frame& frame, const Effort& effort, const EdgeBlur
       places.push_back(*place), lines.push_back(place->line);
     }
   }
-  const EdgeFits edges = locate_edges(frame.light, lines, EdgeKind::step, effort.iterations);
+  const EdgeFits edges = locate_edges(frame.light, lines, effort.iterations);
   for (std::size_t i = 0; i < places.size(); ++i) places[i].edge = edges[i];
   if (effort.thinning == 1) {
     const double even_light = even_light_in(places);
@@ -401,7 +401,7 @@ void measure_sides(const Frame& frame, const Effort& effort, double blur_px, Edg
         places.push_back(place->measurement), lines.push_back(place->line);
     }
   out.sides_in_image = static_cast<int>(places.size());
-  const EdgeFits edges = locate_edges(frame.light, lines, EdgeKind::contour, effort.iterations);
+  const EdgeFits edges = locate_edges(frame.light, lines, effort.iterations);
   InplaceVector<float, 2 * stations> variances;
   for (const EdgeFit& edge : edges)
     if (edge.converged) variances.push_back(edge.residual_variance);

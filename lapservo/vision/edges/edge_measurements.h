@@ -16,8 +16,7 @@ namespace lapservo::internal {
 struct EdgeLimits {
   int min_lines = 12;       ///< generatrices of a pass
   double line_reach = 0.9;  ///< of the visible half width: beyond, light and resolution are gone
-  /// What the model leaves out of every single point of a boundary and of a side (`accuracy_study edges`): tissue
-  /// beside a side is not even.
+  /// What the model leaves out of single points (`accuracy_study edges`): tissue beside a side is not even.
   double single_floor_px = 0.016, side_floor_px = 0.09;
   double interpolation_noise = 1.6;        ///< of the variance: interpolated samples are smoother than pixels are noisy
   double blurred_ambient_fraction = 0.05;  ///< of the light on the shaft, the even part
@@ -36,18 +35,14 @@ struct EdgeLimits {
   int max_residual_sigmas = 3;  ///< of the typical residuals
 
   /// One sigma of what the film moves a point by: this fraction of its square, by the blur. At the true pose (60
-  /// frames, leaning by up to 60 degrees) 0.01 px are left where it is 0.3 px, 0.05 where it is 0.5, 0.06 where it is
-  /// 0.9.
+  /// frames, leaning by up to 60 degrees) 0.01 px are left of 0.3 px, 0.05 of 0.5, 0.06 of 0.9.
   double film_doubt = 0.3;
   double seam_px = 1.5;  ///< boundaries that jump at the seam, by this and blur_reach near to it, are left out
 };
 inline constexpr EdgeLimits edge_limits;
 
-/// Thickness of the film that carries the marker and stands out from the shaft, before a fit: mean and standard
-/// deviation. Where an end is seen from beyond, the cut edge of the film is seen too, and the boundary that is measured
-/// lies below the film's outside, nearer to the axis: by the thickness where the edge is as bright as the outside, by
-/// less or more as it is darker or brighter (lit diffusely from the camera, with some ambient light). The rig does not
-/// say how thick the film is, so each fit estimates it.
+/// Thickness of the film that carries the marker and stands out from the shaft (film_edge.h), before a fit: mean and
+/// standard deviation. The rig does not say how thick it is, so each fit estimates it.
 inline constexpr double film_mean_m = 0.07e-3, film_sigma_m = 0.04e-3;
 
 /// How far one point of an edge in the image lies from where a pose has it.

@@ -11,8 +11,7 @@
 namespace lapservo::internal {
 namespace {
 
-// At every sample: the model's linear basis, a constant and then `Shapes`; and the shapes' derivatives by the edge's
-// position and by the blur.
+// At every sample: the model's linear basis, a constant and then `Shapes`; and the shapes' derivatives.
 template <int Shapes>
 struct Basis {
   using Amplitudes = Eigen::Matrix<float, Shapes + 1, 1>;

@@ -30,16 +30,14 @@ struct EdgeFit {
 inline constexpr float min_edge_information = 1e-9F;
 /// A shape that differs from the others by less than this part of its square is not set apart by it.
 inline constexpr float least_independent = 1e-5F;
-/// Iterations end below the first; the last of several may move the edge by less than the second, an only one by less
-/// than the third.
+/// Iterations end below the first; the last of several may move the edge by the second, an only one by the third.
 inline constexpr float edge_tolerance_px = 0.004F, max_last_step_px = 0.25F, max_only_step_px = 1.5F;
 
 /// A step between two flat stretches, blurred by `blur_px`. Takes up to `iterations` Gauss-Newton steps.
 EdgeFit fit_step(const EdgeProfile& profile, float blur_px, int iterations);
 
-/// The occluding contour of a diffusely lit cylinder of radius `radius_px` with the light near the camera; positive
-/// positions lie inside: background, then ambient plus diffuse light that rises like sqrt(1 - (1 - x / R)^2), blurred.
-/// The apparent edge of such a occluding contour lies inside the true one; this finds the true one.
+/// The true occluding contour of a diffusely lit cylinder of radius `radius_px` with the light near the camera: beyond
+/// the background, for x > 0, ambient plus diffuse light that rises like sqrt(1 - (1 - x / R)^2), blurred.
 EdgeFit fit_contour(const EdgeProfile& profile, float blur_px, float radius_px, int iterations);
 
 }  // namespace lapservo::internal

@@ -22,8 +22,8 @@ struct FilmEdgeLimits {
 inline constexpr FilmEdgeLimits film_edge_limits;
 
 /// The cut edge of the film that carries the marker, between the bare shaft and the outside of the print: where an end
-/// is seen from beyond it shows, as a strip of its own brightness. The end is located between the strip's two borders,
-/// or a little off them, by how bright it is; all of it is measured in the frame but the film's thickness.
+/// is seen from beyond it shows, as a strip of its own brightness. The end is located nearer to the axis than the
+/// outside: by the film's thickness where the strip is as bright, by less or more as it is darker or brighter.
 
 /// How much the outside and, at an end, the film's edge face the camera (cosines); 0 of an edge that is not seen.
 struct Facing {
@@ -36,8 +36,7 @@ struct FadingPoint {
 };
 
 /// The even part of the light on the shaft, from how the change of light over an inner boundary fades towards the
-/// sides, and 1/sigma^2. Both sides of it have the same specular light, which therefore does not count. No certainty:
-/// too few points.
+/// sides, and 1/sigma^2 (0: too few points). Both sides of it have the same specular light, which does not count.
 struct EvenLight {
   double fraction = 0, certainty = 0;
 };
@@ -45,8 +44,7 @@ EvenLight even_light_of(std::span<const FadingPoint> points);
 /// For those of several boundaries, with what is usual.
 double usual_or_seen(std::span<const EvenLight> seen);
 
-/// Where the film's edge lies between the bare shaft (0) and the outside beside it (1) by its light, without specular
-/// light.
+/// The film's edge by its light, not counting specular light: 0 is the bare shaft, 1 the outside beside it.
 double film_edge_level(const Facing& facing, double even_light);
 
 /// The values at a point of an end, along the end's own change of light: bare shaft, and the step up to the outside.
@@ -59,9 +57,8 @@ inline constexpr std::size_t max_end_points = 64;
 /// edge, which faces elsewhere and lies lower by as much.
 InplaceVector<double, max_end_points> gloss_of(std::span<const EndPoint> points);
 
-/// By what fraction of the film's projected width an end is moved inwards whose film's edge has this level, and
-/// d(shift)/d(width). Narrow ones move it by the level; wide ones (in blurs) of which a border is the whole step by
-/// less.
+/// By what fraction of the film's projected width an end is moved inwards whose film's edge has this level (of wide
+/// ones, in blurs, by less than that), and d(shift)/d(width).
 struct FilmShift {
   double fraction, by_width;
 };

@@ -18,8 +18,7 @@ constexpr int taps = 4, chunk_px = 16, needed_px = chunk_px + taps - 1, channels
 constexpr std::uint8_t sampled_gap = 20, low_gap = 6, high_gap = 24;
 
 // At how many pixels of a box four neighbours alternate: the two of one parity both brighter than the two of the other.
-// Where two fields saw something in two places, columns alternate; noise, texture and compression make columns and rows
-// alternate alike.
+// Where two fields saw something in two places, columns do; by noise, texture and compression columns and rows alike.
 struct Alternation {
   int down = 0;    // (u, v) to (u, v + 3)
   int across = 0;  // (u, v) to (u + 3, v)
@@ -45,8 +44,7 @@ int count_alternating(const std::uint8_t* a, const std::uint8_t* b, const std::u
   return count;
 }
 
-// By a fraction of the box's bytes: chunks spread over all its rows and columns. Cheap, and with false alarms: beyond
-// what counts scatter.
+// By chunks spread over all rows and columns of the box. Cheap, and with false alarms: beyond what counts scatter.
 bool is_suspicious(const ImageView& image, const cv::Rect& box) {
   constexpr int max_pixels = 2500, stagger = 5, bytes = channels * chunk_px;
   constexpr double sigmas = 2, few = 2;

@@ -8,7 +8,7 @@
 #include "lapservo/geometry/camera.h"
 #include "lapservo/geometry/response.h"
 #include "lapservo/marker/marker.h"
-#include "lapservo/vision/image/image_view.h"
+#include "lapservo/vision/image/light_image.h"
 #include "lapservo/vision/observation.h"
 
 namespace lapservo::internal {

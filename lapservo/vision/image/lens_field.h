@@ -10,8 +10,7 @@
 namespace lapservo::internal {
 
 /// Which points a camera can show: those before it, hardly farther from its axis than the image's corners, or than
-/// where its distortion folds before them. Beyond, a lens's distortion is not known: it folds places back into the
-/// image.
+/// where its distortion folds before them. Beyond, the model of the distortion folds places back into the image.
 class LensField {
  public:
   static constexpr double nearest_m = 1e-3;  ///< to the camera, along its axis

@@ -7,12 +7,24 @@
 #include <cstdint>
 
 #include <Eigen/Core>
+#include <opencv2/core.hpp>
 
 #include "lapservo/geometry/camera.h"
 #include "lapservo/geometry/response.h"
-#include "lapservo/vision/image/image_view.h"
 
 namespace lapservo::internal {
+
+/// A borrowed 8-bit BGR image.
+struct ImageView {
+  const std::uint8_t* data = nullptr;
+  std::ptrdiff_t row_bytes = 0;
+  int width_px = 0, height_px = 0;
+
+  explicit ImageView(const cv::Mat& bgr)
+      : data(bgr.data), row_bytes(static_cast<std::ptrdiff_t>(bgr.step[0])), width_px(bgr.cols), height_px(bgr.rows) {}
+
+  const std::uint8_t* pixel(int u, int v) const { return data + v * row_bytes + 3 * static_cast<std::ptrdiff_t>(u); }
+};
 
 /// Where in a raw image each channel shows what green shows at a place.
 struct ChannelGeometry {
@@ -34,6 +46,7 @@ struct ChannelGeometry {
     reach_px = corner_px * std::max(std::abs(magnification[0] - 1), std::abs(magnification[2] - 1));
   }
   bool differs() const { return reach_px > 0; }
+  Eigen::Vector2f centre() const { return {centre_u, centre_v}; }
   /// Calls `read<First, Last>(u, v)` for channels First to Last, where the image shows them of green's place.
   template <typename Read>
   void for_each_place(float u, float v, const Read& read) const {

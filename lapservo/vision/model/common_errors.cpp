@@ -210,8 +210,13 @@ RigErrors::RigErrors(const Camera& camera, const Marker& marker, const ShaftPose
   nearer_m_ = wider * (placed.rotation.conjugate() * placed.translation);
   const PrintCovariance print = root_of_print(marker);
   const std::array<double, 4> upper_m = boundaries_m(marker, 0), slopes_m = boundary_slopes_m(marker);
+  // One sigma of the exponent by which light may be off: v^(1 + x) differs from v by x v ln(v), by 0.28 x at most
+  // beside what another exposure makes of it.
+  constexpr double value_by_exponent = 0.28;
+  const double sigma_exponent = camera.response.sigma.value_or(0) / value_by_exponent;
   for (int k = 0; k < 4; ++k) {
     const auto boundary = static_cast<std::size_t>(k);
+    response_px_[boundary] = sigma_exponent * by_exponent_px[boundary];
     const double slope_m = slopes_m[boundary], lower_m = upper_m[boundary] + marker.covered_rad() * slope_m;
     // A wider gap brings the print's lower edge nearer.
     for (int i = 0; i < of_print; ++i)
@@ -219,11 +224,6 @@ RigErrors::RigErrors(const Camera& camera, const Marker& marker, const ShaftPose
                                                          print(3 + k, i) + print(7, i) * slope_m};
     along_m_[of_print][boundary] = shorter * Eigen::Vector2d(upper_m[boundary], lower_m);
   }
-  // One sigma of the exponent by which light may be off: v^(1 + x) differs from v by x v ln(v), by 0.28 x at most
-  // beside what another exposure makes of it.
-  constexpr double value_by_exponent = 0.28;
-  const double sigma_exponent = camera.response.sigma.value_or(0) / value_by_exponent;
-  for (std::size_t k = 0; k < 4; ++k) response_px_[k] = sigma_exponent * by_exponent_px[k];
 }
 
 RigErrors::Shifts RigErrors::of(const Measurement& measurement) const {

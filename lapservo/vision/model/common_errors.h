@@ -41,8 +41,7 @@ struct UsualErrors {
   /// move together by more, mostly where the light comes from aside.
   double common_fraction_of_blur = 0.008, whole_fraction_of_blur = 0.02;
   /// And of the blur's square beyond a lens's, by the shaft's radius: how far sides, which are no steps, are off, and
-  /// by how much all boundaries lean alike, which is what the model of it (moved_by_blur_px()) leaves. Sides of sharp
-  /// images have a blur of usual_side_blur_px.
+  /// by how much all boundaries lean alike, which moved_by_blur_px() leaves; the first is of sharp images' sides.
   double usual_side_blur_px = 1.05, side_of_blur = 1.4, leaning_of_blur = 0.035;
   /// And as a fraction of what the camera's processing moves a boundary by, which is known so well; where colours are
   /// clipped beside boundaries, the larger one. A processing that moves them by doubted_processing_px (rms) doubles the
@@ -52,8 +51,7 @@ struct UsualErrors {
   /// of which psi feels little: without, phi had up to 2.5 of its sigmas in images with 4:2:0, and theta 2.2.
   double side_fraction_of_processing = 0.5, whole_fraction_of_processing = 0.4, leaning_fraction_of_processing = 0.1,
          bowed_fraction_of_processing = 0.3;
-  /// And the part of that which is uncertain before the print is blamed: of exact prints 0 to 0.1 px of 0.3 to 0.7 px
-  /// are left.
+  /// And the uncertain part before the print is blamed: exact prints leave 0 to 0.1 px of 0.3 to 0.7 px.
   double doubted_of_processing = 0.12;
   /// The rest of a value that even that does not explain, beyond the usual: 0.012 moved boundaries by 0.1 px.
   double usual_misfit = 0.004, px_per_misfit = 8;
@@ -66,8 +64,7 @@ struct UsualErrors {
   /// px in JPEG, 0.09 in H.264, 0.007 in defocus (2 to 3.2 px); their tilts 0.03, 0.08, 0.05; the marker looks shorter
   /// by 0.5 % in defocus. In the dark and in noise nothing is left of it.
   double doubted_of_sigma = 0.8, doubted_length_of_sigma = 0.1;
-  /// And by what another renderer than ours leaves of a boundary and its tilt: px, times the blur's square by the
-  /// radius.
+  /// And by what another renderer than ours leaves of both: px, times the blur's square by the radius.
   double doubted_boundary_of_radius = 0.25;
   double doubted_tilt_of_blur = 0.025, doubted_length_of_blur = 0.001;
   /// And how far a processing that a blurred image can't show moves boundaries.
@@ -79,8 +76,8 @@ inline constexpr UsualErrors usual_errors;
 /// measurements [px], to first order. A camera without a covariance has independent numbers, but for the two focal
 /// lengths, a third of whose variance is common: mostly they have all of it in common, but the rig does not say. A
 /// print without one has bands whose errors have most in common: they count as one of its length, beside what they
-/// leave of each boundary (Marker::boundary_sigma_m()). Images show lengths in diameters, and so a measured print is known:
-/// its lengths err with the diameter, beside their own sigmas. Those of another one are known in metres.
+/// leave of each boundary (Marker::boundary_sigma_m()). Images show lengths in diameters, and so a measured print is
+/// known: its lengths err with the diameter, beside their own sigmas. Those of another one are known in metres.
 class RigErrors {
  public:
   using CameraCovariance = decltype(Camera::covariance)::value_type;
@@ -91,23 +88,21 @@ class RigErrors {
   using CameraRoot = Eigen::Matrix<double, camera_numbers, of_camera>;
   using Shifts = Eigen::Matrix<double, most, 1>;
 
-  RigErrors() = default;
   /// `by_exponent_px`: how far a boundary moves with the exponent of the camera's response (moved_by_exponent_px()).
   RigErrors(const Camera& camera, const Marker& marker, const ShaftPose& pose,
             const std::array<double, 4>& by_exponent_px);
 
-  bool any() const { return camera_ != nullptr; }
   static constexpr bool is_of_print(int shift) { return shift > of_camera && shift <= of_camera + of_print; }
   /// Zero for numbers without a sigma.
   Shifts of(const Measurement& measurement) const;
 
  private:
-  const Camera* camera_ = nullptr;
-  CameraRoot camera_root_ = CameraRoot::Zero();  ///< of Camera::covariance
+  const Camera* camera_;
+  CameraRoot camera_root_;  ///< of Camera::covariance
   std::array<double, 4> response_px_{};
   /// How far the print's numbers and the diameter move each boundary: at the print's upper edge, at its lower one.
   std::array<std::array<Eigen::Vector2d, 4>, of_print + 1> along_m_{};
-  Eigen::Vector3d nearer_m_ = Eigen::Vector3d::Zero();  ///< by the diameter, in the unrolled frame's axes
+  Eigen::Vector3d nearer_m_;  ///< by the diameter, in the unrolled frame's axes
 };
 
 /// Whether the camera or the marker has sigmas that move measurements alike.
@@ -126,7 +121,7 @@ struct CommonErrors {
     return m.group < 4 ? boundary_noise_scale : std::max(1.0, boundary_noise_scale);
   }
   PrintDoubt doubt;
-  RigErrors rig;
+  std::optional<RigErrors> rig;  ///< where the rig has sigmas
 };
 
 /// The error of a boundary of this blur as a whole beside a camera's processing, on a shaft of this radius.
@@ -136,9 +131,8 @@ double common_boundary_px(double blur_px, double radius_px);
 /// this sigma, which were blurred by this and moved by this.
 double doubt_scale(double sigma_px, double blur_px, double bias_px);
 
-/// The errors of each boundary and side as a whole, and the noise as it is. `bias_px`: by how much the camera's
-/// processing may have moved each boundary; of those that `processed` shows, it is corrected. `departure_px`: what is
-/// left of a departure from the rig's camera.
+/// The errors of each boundary and side as a whole, and the noise as it is. `bias_px`, `departure_px`: by how much the
+/// camera's processing, corrected where `processed` shows it, and its departure from the rig's may have moved each.
 CommonErrors common_errors(const EdgeMeasurements& pass, const EdgeBlur& blur,
                            const std::optional<ProcessedEdges>& processed, const std::array<double, 4>& bias_px,
                            const std::array<double, 4>& departure_px);

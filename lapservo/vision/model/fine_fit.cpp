@@ -205,7 +205,7 @@ class Fitter {
     return processing_in(without.light()).processing == Processing::none ? *all : known;
   }
   void take_processing_off(const ProcessedEdges& edges) {
-    fit_.bias_px = bias_magnitudes_px(edges);
+    fit_.bias_px = magnitudes_px(edges.bias_px);
     for (std::size_t i = 0; i < pass_.all.size(); ++i)
       pass_.all[i].residual_px -= static_cast<double>(edges.measurement_bias_px[i]);
     move();
@@ -231,14 +231,11 @@ class Fitter {
   }
   std::array<double, 4> departure_px() const {
     std::array<double, 4> radial_px{}, doubt_px{};
-    if (!fit_.departure.doubted()) return doubt_px;
-    const ChannelGeometry& channels = light_.channels();
-    const Eigen::Vector2f centre(channels.centre_u, channels.centre_v);
+    const Eigen::Vector2f centre = light_.channels().centre();
     std::array<int, 4> places{};
-    for (const Measurement& m : pass_.all) {
-      if (m.group >= 4) continue;
-      radial_px[m.group] += static_cast<double>((m.expected_px - centre).dot(m.normal)), ++places[m.group];
-    }
+    for (const Measurement& m : pass_.all)
+      if (m.group < 4)
+        radial_px[m.group] += static_cast<double>((m.expected_px - centre).dot(m.normal)), ++places[m.group];
     for (std::size_t k = 0; k < 4; ++k) doubt_px[k] = fit_.departure.doubt_px(k, radial_px[k] / std::max(1, places[k]));
     return doubt_px;
   }
@@ -256,11 +253,7 @@ class Fitter {
   }
   void tell(const PrintFit& print) {
     if (scene_.registration) fit_.with_registration = print.by_rcm_m * scene_.registration->covariance.topRows<3>();
-    fit_.covariance = print.covariance;
-    fit_.off_probability = print.off_probability;
-    fit_.p_false = print.p_false, fit_.p_false_by_tolerance = print.p_false_by_tolerance;
-    fit_.psi_variance_by_tolerance = print.psi_variance_by_tolerance;
-    fit_.misses_rcm = print.misses_rcm;
+    static_cast<PrintVerdict&>(fit_) = print;
     fit_.converged = true;
   }
 

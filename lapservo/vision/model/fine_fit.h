@@ -15,8 +15,7 @@ namespace lapservo::internal {
 
 /// How a fine fit settles.
 struct FineFitLimits {
-  /// How far a point may be off beside its noise and still agree with the fit: edges of blood beside a boundary move
-  /// it.
+  /// How far a point may be off beside its noise and still agree with the fit: blood beside a boundary moves it.
   double tolerated_px = 0.037;
   double settled_px = max_only_step_px;  ///< a pass that moves no point farther is the last: one step locates edges
   double settled_blur = 0.1;      ///< change of the blur, a fraction of it, below which edges need not be located again
@@ -30,11 +29,10 @@ struct FineFitLimits {
 };
 inline constexpr FineFitLimits fine_fit_limits;
 
-struct FineFit {
+struct FineFit : PrintVerdict {
   bool converged = false;
   PoseUnknowns unknowns;
-  PoseUnknowns as_the_rig_says;                ///< the pose, were the print exactly so
-  PoseMatrix covariance = PoseMatrix::Zero();  ///< of the unknowns, one sigma squared
+  PoseUnknowns as_the_rig_says;  ///< the pose, were the print exactly so
   /// Covariance of the unknowns with the registration's numbers (RcmPrior).
   Eigen::Matrix<double, pose_unknowns, 6> with_registration = Eigen::Matrix<double, pose_unknowns, 6>::Zero();
   EdgeBlur blur;
@@ -44,10 +42,7 @@ struct FineFit {
   int sides_in_image = 0;         ///< places at which the shaft's sides were looked for
   int sides_used = 0;             ///< of them, those at which the side was located and agrees with the fit
   double inlier_rms_sigmas = 0;   ///< of the boundaries' residuals, print errors taken out, by noise and tolerated_px
-  double off_probability = 0, p_false = 1, p_false_by_tolerance = 0;  ///< as PrintFit has them
-  double psi_variance_by_tolerance = 0;         ///< of the covariance, what the rig's tolerance of the print adds
-  bool misses_rcm = false;                      ///< as PrintFit has it
-  bool asked = false;                           ///< what the camera did to the image
+  bool asked = false;             ///< what the camera did to the image
   Processing processing = Processing::unknown;  ///< as far as wanted
   int processing_explained = 0;                 ///< how often ProcessingEvidence::explained
   int asked_for_departure = 0;                  ///< how often find_departure() was
@@ -68,8 +63,7 @@ struct FineFit {
 /// Expectations by the frames before. `ask`: whether to look at what the camera did to the image beyond its response
 /// (picture_processing.h), which costs a tenth of a tracked frame's time where it did nothing. bias_px, an earlier
 /// frame's, is the uncertainty of a frame that can't show it. `departure` is what earlier frames showed of the camera.
-/// A frame whose boundaries' mean blur is another than that of `blur` is examined in any case: the camera's sharpening
-/// may have been switched on.
+/// A frame of another mean blur than that of `blur` is examined in any case: sharpening may have been switched on.
 struct Expected {
   bool ask = true;
   std::optional<EdgeBlur> blur = {};
@@ -79,9 +73,8 @@ struct Expected {
 };
 
 /// Fits the pose to all boundaries on all visible generatrices and to the shaft's sides, located to a fraction of a
-/// pixel in linear light, with a robust loss. `start` must be good to some pixels. The result is held at the RCM where
-/// the scene has a registration, whatever the start is, unless a well seen marker misses it or it lies beyond the
-/// marker.
+/// pixel in linear light, with a robust loss. `start` must be good to some pixels. The result is held at the RCM of the
+/// scene's registration, whatever the start is, unless a well seen marker misses it or it lies beyond the marker.
 FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknowns& start,
                    const Expected& expected = {});
 

@@ -7,18 +7,11 @@
 
 namespace lapservo::internal {
 
-UnknownMatrix NormalEquations::information() const {
-  UnknownMatrix information;
-  for (int i = 0; i < fit_unknowns; ++i)
-    for (int j = 0; j <= i; ++j) information(i, j) = information(j, i) = lower_[i][j];
-  return information;
-}
-
 UnknownVector NormalEquations::solve(double damping) const {
   UnknownMatrix damped = information();
   const UnknownVector diagonal = damped.diagonal();
   damped.diagonal() += damping * diagonal.cwiseMax(1e-12 * diagonal.maxCoeff());
-  const UnknownVector step = damped.ldlt().solve(Eigen::Map<const UnknownVector>(gradient_.data()));
+  const UnknownVector step = damped.ldlt().solve(gradient_);
   return step.allFinite() ? step : UnknownVector::Zero();
 }
 

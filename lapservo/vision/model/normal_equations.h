@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <optional>
 
 #include "lapservo/vision/shaft/shaft_pose.h"
@@ -14,19 +13,19 @@ class NormalEquations {
   void add(const UnknownVector& row, double residual, double weight) {
     for (int i = 0; i < fit_unknowns; ++i) {
       const double weighted = weight * row[i];
-      for (int j = 0; j <= i; ++j) lower_[i][j] += weighted * row[j];
+      for (int j = 0; j <= i; ++j) upper_(j, i) += weighted * row[j];
       gradient_[i] += weighted * residual;
     }
   }
 
-  UnknownMatrix information() const;
+  UnknownMatrix information() const { return upper_.selfadjointView<Eigen::Upper>(); }
 
   /// The step; `damping` scales the diagonal (Marquardt). Directions without information get no step.
   UnknownVector solve(double damping) const;
 
  private:
-  std::array<std::array<double, fit_unknowns>, fit_unknowns> lower_{};
-  std::array<double, fit_unknowns> gradient_{};
+  UnknownMatrix upper_ = UnknownMatrix::Zero();
+  UnknownVector gradient_ = UnknownVector::Zero();
 };
 
 /// So much of a diagonal makes equations solvable that lack a direction, and hardly moves the others.

@@ -13,8 +13,7 @@ namespace lapservo::internal {
 namespace {
 
 // Sums over a group of the weighted products of: the row of pose and film, that of the print's errors at its two edges,
-// the residual, and 1. They have a fixed size, which is several times faster; symmetric, of which the lower half is
-// summed.
+// the residual, and 1. They are symmetric: the lower half is summed, at a fixed size, which is several times faster.
 class Products {
  public:
   static constexpr int at_print = fit_unknowns, at_residual = at_print + 2, at_one = at_print + 3;
@@ -27,19 +26,12 @@ class Products {
     row[at_one] = 1;
     add_columns(row, weight, std::make_integer_sequence<int, at_one + 1>());
   }
-  UnknownMatrix xx() const { return sums_.topLeftCorner<fit_unknowns, fit_unknowns>().selfadjointView<Eigen::Lower>(); }
-  auto x(int by) const { return sums_.row(by).head<fit_unknowns>(); }
-  auto nx(int edge) const { return x(at_print + edge); }
-  double nn(int edge, int other) const {
-    return sums_(at_print + std::max(edge, other), at_print + std::min(edge, other));
-  }
-  double n(int by, int edge) const { return sums_(by, at_print + edge); }
-  double weight() const { return sums_(at_one, at_one); }
-  double residual() const { return sums_(at_one, at_residual); }
+  auto both_halves() const { return Square(lower_.selfadjointView<Eigen::Lower>()); }
 
  private:
   static constexpr int size = at_one + 1 + (at_one + 1) % 2;  // a whole number of registers
   using Row = Eigen::Matrix<double, size, 1>;
+  using Square = Eigen::Matrix<double, size, size>;
 
   template <int... Columns>
   void add_columns(const Row& row, double weight, std::integer_sequence<int, Columns...>) {
@@ -48,28 +40,31 @@ class Products {
   template <int Column>
   void add_column(const Row& row, double weight) {
     constexpr int count = size - (Column - Column % 2);  // from a register's first on
-    sums_.col(Column).tail<count>() += (weight * row[Column]) * row.tail<count>();
+    lower_.col(Column).tail<count>() += (weight * row[Column]) * row.tail<count>();
   }
 
-  Eigen::Matrix<double, size, size> sums_ = Eigen::Matrix<double, size, size>::Zero();
+  Square lower_ = Square::Zero();
 };
 
 // Adds a group's products to the sums of all, and returns its pull.
 GroupPull gathered(const Products& products, std::size_t group, PrintEquations& all) {
+  constexpr int print = Products::at_print, residual = Products::at_residual, one = Products::at_one;
+  const auto sums = products.both_halves();
   GroupPull pull;
-  pull.x = products.x(Products::at_one);
-  pull.weight = products.weight();
-  pull.residual = products.residual();
-  all.xx += products.xx();
-  all.x += products.x(Products::at_residual).transpose();
+  pull.x = sums.col(one).head<fit_unknowns>();
+  pull.weight = sums(one, one);
+  pull.residual = sums(one, residual);
+  all.xx += sums.topLeftCorner<fit_unknowns, fit_unknowns>();
+  all.x += sums.col(residual).head<fit_unknowns>();
   if (group >= errors_of_boundary.size()) return pull;
   const auto& errors = errors_of_boundary[group];
   for (const int edge : {0, 1}) {
     const int error = errors[static_cast<std::size_t>(edge)];
-    all.nx.row(error) += products.nx(edge);
-    for (const int other : {0, 1}) all.nn(error, errors[static_cast<std::size_t>(other)]) += products.nn(edge, other);
-    all.n[error] += products.n(Products::at_residual, edge);
-    pull.n[error] += products.n(Products::at_one, edge);
+    all.nx.row(error) += sums.row(print + edge).head<fit_unknowns>();
+    for (const int other : {0, 1})
+      all.nn(error, errors[static_cast<std::size_t>(other)]) += sums(print + edge, print + other);
+    all.n[error] += sums(print + edge, residual);
+    pull.n[error] += sums(print + edge, one);
   }
   return pull;
 }
@@ -108,7 +103,7 @@ void add_pulls_of_all(std::span<const Measurement> measurements, const CommonErr
 void add_pulls_of_rig(std::span<const Measurement> measurements, const CommonErrors& errors, PrintSums& sums) {
   std::array<RigPull, RigErrors::most> pulls;
   for (const Measurement& m : measurements) {
-    const RigErrors::Shifts shifts = certainty_of(m, errors) * errors.rig.of(m);
+    const RigErrors::Shifts shifts = certainty_of(m, errors) * errors.rig->of(m);
     for (int i = 0; i < RigErrors::most; ++i) {
       RigPull& pull = pulls[static_cast<std::size_t>(i)];
       pull.add(m, shifts[i]);
@@ -164,15 +159,7 @@ PrintSums print_sums(std::span<const Measurement> measurements, double film_prio
   }
   sums.equations.add(UnknownVector::Unit(film_unknown), PrintVector::Zero(), 1, film_prior);
   if (errors.whole_px > 0 || errors.leaning_px > 0 || errors.bowed_px > 0) add_pulls_of_all(measurements, errors, sums);
-  if (errors.rig.any()) add_pulls_of_rig(measurements, errors, sums);
-  return sums;
-}
-
-PrintSums of_exact_print(PrintSums sums) {
-  InplaceVector<RigPull, RigErrors::most> others;
-  for (const RigPull& pull : sums.rig)
-    if (!pull.of_print) others.push_back(pull);
-  sums.rig = others;
+  if (errors.rig) add_pulls_of_rig(measurements, errors, sums);
   return sums;
 }
 
@@ -182,18 +169,18 @@ PrintSums held(PrintSums sums, const RcmMeasurement& rcm) {
   return sums;
 }
 
-std::optional<PrintInformation> information_of(const PrintSums& sums) {
+PrintInformation information_of(const PrintSums& sums) {
   PrintEquations e = sums.equations;
   for (const GroupPull& pull : sums.pulls)
     if (pull.weight > 0) e.add(pull.x, pull.n, -certainty_of(pull), pull.residual);
   const auto inverse = inverse_of(e.xx);
-  if (!inverse) return std::nullopt;
+  if (!inverse) return {};
   const PrintCrossMatrix through = e.nx.lazyProduct(*inverse);
   const PrintInformation print{e.nn - through.lazyProduct(e.nx.transpose()), e.n - through.lazyProduct(e.x)};
   return sums.rig.empty() ? print : doubted(print, shapes_of_rig(print, sums, through));
 }
 
-std::optional<PrintSolution> solved_with_print(const PrintSums& sums, const PrintPrior& prior) {
+std::optional<PrintSolution> solved_with_print(const PrintSums& sums, const PrintPrior& prior, bool is_exact) {
   const PrintEquations& e = sums.equations;
   const PrintMatrix print_covariance = covariance_of(e.nn, prior);
   const PrintCrossMatrix by_x = print_covariance.lazyProduct(e.nx);
@@ -216,7 +203,8 @@ std::optional<PrintSolution> solved_with_print(const PrintSums& sums, const Prin
   };
   for (const GroupPull& pull : sums.pulls) widen(pull);
   for (const GroupPull& pull : sums.of_all_boundaries) widen(pull);
-  for (const RigPull& pull : sums.rig) widen(pull);
+  for (const RigPull& pull : sums.rig)
+    if (!(is_exact && pull.of_print)) widen(pull);
   const bool finite = solution.covariance.allFinite() && solution.step.allFinite() && solution.print_mm.allFinite();
   return finite && (solution.covariance.diagonal().array() > 0).all() ? std::optional(solution) : std::nullopt;
 }

@@ -72,15 +72,12 @@ struct PrintSums {
 /// Weighted robustly about the errors' lines. `film_prior` as the fit has it.
 PrintSums print_sums(std::span<const Measurement> measurements, double film_prior, const CommonErrors& errors);
 
-/// The same of a print that is known exactly.
-PrintSums of_exact_print(PrintSums sums);
-
 /// The same of a shaft that is held at the RCM.
 PrintSums held(PrintSums sums, const RcmMeasurement& rcm);
 
-/// The residuals' evidence about the print's errors, whatever the pose, the film and the common errors are. Nullopt
-/// when they say nothing.
-std::optional<PrintInformation> information_of(const PrintSums& sums);
+/// The residuals' evidence about the print's errors, whatever the pose, the film and the common errors are; none where
+/// the frame shows nothing of them.
+PrintInformation information_of(const PrintSums& sums);
 
 /// By how much the print's errors move a measurement.
 inline double print_shift_px(const Measurement& m, const PrintVector& print_mm) {
@@ -97,7 +94,8 @@ struct PrintSolution {
   UnknownMatrix covariance = UnknownMatrix::Zero();
 };
 
-/// The likeliest pose when the print's errors are so, and how sure it is. Nullopt when a direction is not seen at all.
-std::optional<PrintSolution> solved_with_print(const PrintSums& sums, const PrintPrior& prior);
+/// The likeliest pose when the print's errors are so, and how sure it is; where `is_exact`, without the errors of the
+/// print that the rig gives sigmas. Nullopt when a direction is not seen at all.
+std::optional<PrintSolution> solved_with_print(const PrintSums& sums, const PrintPrior& prior, bool is_exact = false);
 
 }  // namespace lapservo::internal

@@ -21,16 +21,14 @@ using PrintMatrix = Eigen::Matrix<double, print_errors, print_errors>;
 /// Which of them boundary 0..3 has at its upper and at its lower edge (tau = 0 and tau -> 2 pi).
 inline constexpr std::array<std::array<int, 2>, 4> errors_of_boundary{{{0, 0}, {1, 2}, {3, 4}, {5, 5}}};
 
-/// The residuals' evidence about the print's errors: the Gaussian likelihood exp(gradient . x - x . information x / 2),
-/// x in millimetres.
+/// The residuals' evidence about the print's errors x [mm]: the likelihood exp(gradient . x - x . information x / 2).
 struct PrintInformation {
   PrintMatrix information = PrintMatrix::Zero();  ///< positive semi-definite
   PrintVector gradient = PrintVector::Zero();
 };
 
 /// How an image that is blurred, compressed or processed moves boundaries as a print's errors would, one sigma each:
-/// every boundary as a whole, the inner ones about their middle (rms over what shows), and all as if the marker were
-/// longer by this fraction.
+/// every boundary as a whole, the inner ones about their middle (rms over what shows), all as of a longer marker.
 struct PrintDoubt {
   double boundary_px = 0, tilt_px = 0, length_fraction = 0;
 };
@@ -49,8 +47,7 @@ PrintInformation doubted(PrintInformation print, std::span<const PrintVector> sh
 
 /// How large the print's errors are (one sigma) [mm]: each by itself, and both inner boundaries' alike, since the
 /// middle ink lies aside, which looks most like a turn. Their covariance is bands^2 I + ink^2 c c^T, c the inner
-/// boundaries' shift. `measured_mm`, a part of the bands' size, weighs measurements only: a covariance of the marker
-/// (RigErrors) says how large these errors are.
+/// boundaries' shift. `measured_mm`, a part of the bands' size, weighs measurements only: RigErrors has these errors.
 struct PrintPrior {
   double bands_mm = 0, ink_mm = 0, measured_mm = 0;
 };
@@ -59,8 +56,7 @@ struct PrintPrior {
 /// leave [mm^2]. Bands are taken to be off by a picometre at least, by a micrometre where the ink lies aside.
 PrintMatrix covariance_of(const PrintMatrix& information_by_boundary, const PrintPrior& prior);
 
-/// How likely residuals make a print of such a size of errors, compared with an exact one: the logarithm of both
-/// likelihoods' ratio.
+/// How likely residuals make a print of such a size of errors, by an exact one: the logarithm of the ratio.
 double likelihood_gain(const PrintInformation& print, const PrintPrior& prior);
 
 }  // namespace lapservo::internal

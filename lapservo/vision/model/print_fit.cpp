@@ -96,12 +96,10 @@ std::optional<Mixture> mixed(const PrintSums& sums, const Hypotheses& prior, con
                              const Marker& marker) {
   const auto as_the_rig_says = solved_with_print(sums, prior[0].prior);
   if (!as_the_rig_says) return std::nullopt;
-  // Nothing, where the frame shows nothing of the print.
-  const PrintInformation print = information_of(sums).value_or(PrintInformation{});
   std::array<double, 4> weights{};
   for (std::size_t k = 0; k < weights.size(); ++k) weights[k] = sums.pulls[k].weight;
   const PrintShapes shapes_mm = shapes_of(doubt, sums.equations.nn, weights, marker);
-  const Hypotheses all = weighted(prior, doubted(print, shapes_mm));
+  const Hypotheses all = weighted(prior, doubted(information_of(sums), shapes_mm));
   Mixture mixture;
   mixture.as_the_rig_says = *as_the_rig_says;
   mixture.add(*as_the_rig_says, all[0].weight);
@@ -122,8 +120,7 @@ double missed_sigmas(const UnknownVector& step, const UnknownMatrix& covariance,
   return std::sqrt(std::max(0.0, missed.dot(of_both.inverse() * missed)));
 }
 
-// The same of what the image alone shows; 0 where that is no whole pose. Most frames show the rig's print, and of that
-// pass the RCM.
+// The same of what the image alone shows; 0 of no whole pose. Most frames show the rig's print passing the RCM.
 double missed_by_image(const PrintSums& by_image, const RcmMeasurement& rcm, const Hypotheses& prior,
                        const PrintDoubt& doubt, const Marker& marker) {
   const auto free = solved_with_print(by_image, prior[0].prior);
@@ -153,7 +150,7 @@ std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const std
   const auto print = mixed(sums, prior, errors.doubt, marker);
   if (!print) return std::nullopt;
   const bool is_exact = !(prior[0].prior.bands_mm > 0) && sums.rig.empty();
-  const auto exact = is_exact ? print->as_the_rig_says : solved_with_print(of_exact_print(sums), {});
+  const auto exact = is_exact ? print->as_the_rig_says : solved_with_print(sums, {}, true);
   // Where the passes ended, and the measurements were taken.
   const bool as_passes = !rcm || rcm->held_by_passes == fit.through_rcm;
   const auto settled =

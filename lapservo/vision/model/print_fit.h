@@ -43,22 +43,25 @@ inline constexpr PrintLimits print_limits;
 /// The probability that a normal error of this mean and variance is beyond Observation::false_rad.
 double p_false_of(double mean_rad, double variance_rad2);
 
-/// A pose, given that the print may lie elsewhere than the rig says: each boundary at either edge of the print (tau = 0
-/// and tau -> 2 pi, linear between; the ends are circles).
-struct PrintFit {
-  UnknownVector step;                  ///< to the mean of pose and film, from where the measurements were taken
-  UnknownVector step_as_the_rig_says;  ///< the same, of the rig's print
-  PoseMatrix covariance;               ///< of the pose's unknowns
-  /// d(the pose's unknowns)/d(RCM in the camera frame) [1/m].
-  Eigen::Matrix<double, pose_unknowns, 3> by_rcm_m = Eigen::Matrix<double, pose_unknowns, 3>::Zero();
-  /// The RCM lies beyond the marker, or contradicted_sigmas and more beside the shaft that the image alone shows,
-  /// whatever the print is.
+/// How sure a fit is, whatever the print is.
+struct PrintVerdict {
+  PoseMatrix covariance = PoseMatrix::Zero();  ///< of the pose's unknowns, one sigma squared
+  /// The RCM lies beyond the marker, or contradicted_sigmas and more beside the shaft that the image alone shows.
   bool misses_rcm = false;
-  bool through_rcm = false;              ///< held at the RCM, which it misses only where it may not be contradicted
   double off_probability = 0;            ///< that the print is off by print_limits.off_mm and more
   double p_false = 1;                    ///< that psi is wrong
-  double p_false_by_tolerance = 0;       ///< what the rig's tolerance adds to it
+  double p_false_by_tolerance = 0;       ///< what the rig's tolerance of the print adds to it
   double psi_variance_by_tolerance = 0;  ///< what the rig's tolerance adds to an exact print's
+};
+
+/// A pose, given that the print may lie elsewhere than the rig says: each boundary at either edge of the print (tau = 0
+/// and tau -> 2 pi, linear between; the ends are circles).
+struct PrintFit : PrintVerdict {
+  UnknownVector step;                  ///< to the mean of pose and film, from where the measurements were taken
+  UnknownVector step_as_the_rig_says;  ///< the same, of the rig's print
+  /// d(the pose's unknowns)/d(RCM in the camera frame) [1/m].
+  Eigen::Matrix<double, pose_unknowns, 3> by_rcm_m = Eigen::Matrix<double, pose_unknowns, 3>::Zero();
+  bool through_rcm = false;  ///< held at the RCM, which it misses only where it may not be contradicted
 };
 
 /// The RCM beside a fit: how far the shaft passes it, whether the passes held it there, and whether the frame shows
@@ -71,8 +74,8 @@ struct RcmBesideFit {
 /// Estimates the print's errors from the settled measurements' residuals. How large they usually are is not known, so
 /// the pose is a mean over the rig's print and misprints (PrintLimits), each weighted by how likely it makes the
 /// residuals. On return the residuals are those that the step and the print's likeliest errors leave. `film_prior` as
-/// the fit has it, `is_known`: earlier frames showed that the print is the rig's. Nullopt when a direction is not seen
-/// at all.
+/// the fit has it, `is_known`: earlier frames showed that the print is the rig's. Nullopt of a direction that is
+/// unseen.
 std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const std::optional<RcmBesideFit>& rcm,
                                   double film_prior, const Marker& marker, bool is_known, const CommonErrors& errors);
 

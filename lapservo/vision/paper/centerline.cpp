@@ -8,6 +8,7 @@
 #include <optional>
 
 #include <Eigen/Cholesky>
+#include <Eigen/Geometry>
 #include <opencv2/imgproc.hpp>
 
 #include "lapservo/core/angles.h"
@@ -83,10 +84,8 @@ std::vector<Region> regions_of(const BandMasks& masks) {
   return regions;
 }
 
-// The axis' image: the middle between lines fitted to the region's two sides, directed by the order of the colours.
-struct MiddleLine {
-  Eigen::Vector2d origin_px, along;  // ideal pixels
-};
+// The axis' image (ideal pixels): the middle between the region's two sides, directed by the order of the colours.
+using MiddleLine = Eigen::ParametrizedLine<double, 2>;
 std::optional<MiddleLine> middle_line(const Camera& camera, const BandMasks& masks, const Region& region) {
   const auto centroid = [&](const cv::Moments& m) {
     return Eigen::Vector2d(region.box.x + m.m10 / m.m00, region.box.y + m.m01 / m.m00);
@@ -152,7 +151,7 @@ std::optional<Edges> boundaries_on(const MiddleLine& line, const Camera& camera,
   first.fill(HUGE_VAL), last.fill(-HUGE_VAL);
   for (int i = -reach; i <= reach; ++i) {
     const double x = i * step_px;
-    const Eigen::Vector2d ideal = line.origin_px + x * line.along;
+    const Eigen::Vector2d ideal = line.pointAt(x);
     if (!camera.contains(ideal, -0.25 * camera.width_px)) continue;
     const Eigen::Vector2d raw = camera.raw_from_ideal(ideal);
     const int u = static_cast<int>(std::lround(raw.x())), v = static_cast<int>(std::lround(raw.y()));
@@ -165,7 +164,7 @@ std::optional<Edges> boundaries_on(const MiddleLine& line, const Camera& camera,
   for (std::size_t k = 0; k < 4; ++k)
     if (std::abs(x[k]) > reach || (k > 0 && !(x[k] > x[k - 1] + 1))) return std::nullopt;
   Edges edges;
-  for (std::size_t k = 0; k < 4; ++k) edges[k] = line.origin_px + x[k] * line.along;
+  for (std::size_t k = 0; k < 4; ++k) edges[k] = line.pointAt(x[k]);
   return edges;
 }
 
@@ -176,9 +175,11 @@ std::optional<JointVector> configuration_from(const Camera& camera, const Marker
   auto start = configuration_through(camera_from_rcm, camera.ray_from_ideal(edges[0]) * depth_m);
   if (!start) return std::nullopt;
   Eigen::Vector3d x(start->theta_rad, start->phi_rad, start->rho_m);
+  const auto line_at = [&](const Eigen::Vector3d& p) {  // for any psi: the ends don't depend on it
+    return centre_line(camera, marker, camera_from_rcm * rcm_from_unrolled({p[0], p[1], p[2], 0}), 0);
+  };
   const auto seen = [&](const Eigen::Vector3d& p) -> std::optional<Eigen::Vector4d> {
-    const Rigid3 unrolled = camera_from_rcm * rcm_from_unrolled({p[0], p[1], p[2], 0});
-    const auto line = centre_line(camera, marker, unrolled, 0);  // the ends don't depend on psi
+    const auto line = line_at(p);
     if (!line) return std::nullopt;
     return Eigen::Vector4d(line->ideal_px[0].x(), line->ideal_px[0].y(), line->ideal_px[3].x(), line->ideal_px[3].y());
   };
@@ -203,14 +204,9 @@ std::optional<JointVector> configuration_from(const Camera& camera, const Marker
     x += step.cwiseMax(-longest).cwiseMin(longest);
   }
   if (miss_px > 10) return std::nullopt;  // no shaft through the RCM looks like this
-  const Rigid3 unrolled = camera_from_rcm * rcm_from_unrolled({x[0], x[1], x[2], 0});
-  const auto line = centre_line(camera, marker, unrolled, 0);
+  const auto line = line_at(x);
   if (!line) return std::nullopt;
   return JointVector{wrap_pi(x[0]), x[1], x[2], wrap_pi(rotation_rad(marker, line->facing_azimuth_rad, tau_rad))};
-}
-
-double tau_from(const CrossRatioDecoder& decoder, const Edges& e) {
-  return decoder.tau_rad(cross_ratio((e[1] - e[0]).norm(), (e[2] - e[1]).norm(), (e[3] - e[2]).norm()));
 }
 
 using EdgesVector = Eigen::Matrix<double, 8, 1>;
@@ -246,38 +242,40 @@ std::optional<Observation> observe_edges(const Camera& camera, const Instrument&
   for (const EdgesVector& error : errors_of(edges, boundary_sigma_px))
     o.edges_covariance_px2 += error * error.transpose();
   for (std::size_t k = 0; k < 4; ++k) o.edges_raw_px[k] = camera.raw_from_ideal(edges[k]);
+  const Marker& marker = instrument.marker;
   const auto& camera_from_rcm = instrument.camera_from_rcm;
   o.features = features_of(edges, camera_from_rcm ? projected_rcm_px(camera, *camera_from_rcm) : std::nullopt);
   const double room = 0.1 * (decoder.highest_cross_ratio() - decoder.lowest_cross_ratio());
   if (o.features.cross_ratio < decoder.lowest_cross_ratio() - room ||
       o.features.cross_ratio > decoder.highest_cross_ratio() + room)
     return std::nullopt;
-  o.tau_rad = tau_from(decoder, edges);
-  const double print_px = instrument.marker.boundary_sigma_m() * o.features.l_px / instrument.marker.length_m();
+  o.tau_rad = decoder.tau_rad(o.features.cross_ratio);
+  const double print_px = marker.boundary_sigma_m() * o.features.l_px / marker.length_m();
   const auto errors = errors_of(edges, std::hypot(boundary_sigma_px, print_px));
+  const auto ratio_of = [](const Edges& e) { return features_of(e, std::nullopt).cross_ratio; };
   // At the ends of its range tau is clamped and its derivative lost: there the mean slope over the turn stands in.
   double tau_variance = 0, ratio_variance = 0;
   for (const EdgesVector& error : errors) {
-    const Edges changed = moved(edges, error);
-    tau_variance += std::pow(tau_from(decoder, changed) - o.tau_rad, 2);
-    ratio_variance += std::pow(features_of(changed, std::nullopt).cross_ratio - o.features.cross_ratio, 2);
+    const double ratio = ratio_of(moved(edges, error));
+    tau_variance += std::pow(decoder.tau_rad(ratio) - o.tau_rad, 2);
+    ratio_variance += std::pow(ratio - o.features.cross_ratio, 2);
   }
   const double mean_slope = two_pi / (decoder.highest_cross_ratio() - decoder.lowest_cross_ratio());
   o.sigma_tau_rad = std::sqrt(std::max(tau_variance, mean_slope * mean_slope * ratio_variance));
   if (!camera_from_rcm) {
-    const double depth_m = camera.fx_px * instrument.marker.length_m() / o.features.l_px;
+    const double depth_m = camera.fx_px * marker.length_m() / o.features.l_px;
     const Eigen::Vector3d from = camera.ray_from_ideal(edges[0]) * depth_m,
                           to = camera.ray_from_ideal(edges[3]) * depth_m;
     o.camera_from_unrolled = {rotation_between(Eigen::Vector3d::UnitZ(), to - from), from};
     return o;
   }
-  const Marker& marker = instrument.marker;
   const auto q = configuration_from(camera, marker, *camera_from_rcm, edges, o.tau_rad);
   if (!q) return std::nullopt;
   Observation::Rcm rcm{*q, Eigen::Matrix4d::Zero()};
   for (const EdgesVector& error : errors) {
     const Edges changed = moved(edges, error);
-    const auto other = configuration_from(camera, marker, *camera_from_rcm, changed, tau_from(decoder, changed));
+    const double tau_rad = decoder.tau_rad(ratio_of(changed));
+    const auto other = configuration_from(camera, marker, *camera_from_rcm, changed, tau_rad);
     if (!other) return std::nullopt;
     const Eigen::Vector4d change = configuration_change(*q, *other);
     rcm.covariance += change * change.transpose();

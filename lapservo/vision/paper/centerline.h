@@ -13,8 +13,7 @@ namespace lapservo::internal {
 /// Method::centerline: the paper's Algorithm 1, the baseline to compare with. Segmentation in HSV, morphological
 /// opening, the middle line between the shaft's two sides, the colour boundaries where that line crosses them (to the
 /// pixel), their cross-ratio, tau by eq. (18). With camera_from_rcm also theta, phi and rho from e0 and e3, and psi =
-/// gamma - tau - seam. Sigmas propagate an assumed boundary noise of 0.5 px, at the ends 1.3 px along the shaft, and
-/// the registration's covariance through the same equations.
+/// gamma - tau - seam. Sigmas propagate an assumed boundary noise and the registration's covariance through these.
 class CenterlineMethod {
  public:
   /// Borrows the rig, whose registrations may change from frame to frame.

@@ -27,8 +27,7 @@ struct RcmMeasurement {
 /// The rig's knowledge of an instrument's RCM frame.
 struct RcmPrior {
   Rigid3 camera_from_rcm;
-  /// Covariance of the translation [m], then of a rotation vector about the camera's axes [rad]. Zero of a registration
-  /// that counts as exact.
+  /// For the translation [m], then a rotation vector about the camera's axes [rad]; zero where it counts as exact.
   RegistrationMatrix covariance = RegistrationMatrix::Zero();
 
   /// The distances count as known to `least_sigma_m` at best: a rough pose is held at the RCM as well as it is known.

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include <Eigen/Geometry>
+
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/marker/azimuths.h"
 #include "lapservo/vision/image/lens_field.h"
@@ -109,15 +111,14 @@ void ShaftCover::draw(const Camera& camera, const Marker& marker, const std::arr
 }
 
 void ShaftCover::frame(const Camera& camera) {
-  Eigen::Vector2d first(HUGE_VAL, HUGE_VAL), last(-HUGE_VAL, -HUGE_VAL);
-  for (const Section& section : sections_)
-    for (const Eigen::Vector2d& place : {section.left_px, section.right_px})
-      first = first.cwiseMin(place), last = last.cwiseMax(place);
+  Eigen::AlignedBox2d box_px;
+  for (const Section& section : sections_) box_px.extend(section.left_px).extend(section.right_px);
   const auto cell = [](double px, int size_px) {
     return static_cast<int>(std::clamp(px, 0.0, size_px - 1.0)) / cell_px;
   };
-  left_ = cell(first.x(), camera.width_px), top_ = cell(first.y(), camera.height_px);
-  columns_ = cell(last.x(), camera.width_px) - left_ + 1, rows_ = cell(last.y(), camera.height_px) - top_ + 1;
+  left_ = cell(box_px.min().x(), camera.width_px), top_ = cell(box_px.min().y(), camera.height_px);
+  columns_ = cell(box_px.max().x(), camera.width_px) - left_ + 1;
+  rows_ = cell(box_px.max().y(), camera.height_px) - top_ + 1;
   cells_.assign(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_), Cell{});
 }
 

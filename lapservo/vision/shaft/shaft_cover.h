@@ -86,9 +86,8 @@ bool lies_before(const ShaftPose& other, const Marker& marker, const ShaftPose& 
 bool lies_beside(const Camera& camera, const Marker& others_marker, const ShaftPose& other, const Blob& blob,
                  const std::array<std::uint8_t, 3>& bands);
 
-/// Whether the marker of one of them shows in a pixel of this colour class, as far as colours show; and whether one
-/// lies before what is seen there at this depth. Not inline: they are needed seldom, and what looks at every pixel of a
-/// line is short without them.
+/// Whether one of them explains() a pixel of this colour class; and whether one hides() what is seen there at this
+/// depth. Not inline: they are needed seldom, and what looks at every pixel of a line is short without them.
 bool explained_by(std::span<const ShaftCover* const> others, const Eigen::Vector2d& raw_px, std::uint8_t colour);
 bool hidden_by(std::span<const ShaftCover* const> others, const Eigen::Vector2d& raw_px, double depth_m);
 

@@ -26,15 +26,13 @@ inline Eigen::Vector3d point_on(const ShaftPose& pose, const Marker& marker, dou
   return pose.camera_from_unrolled * surface_point(marker.radius_m(), azimuth_rad, along_m);
 }
 
-/// Azimuth on the marker of the generatrix that faces the camera, [0, 2 pi). Nullopt where the camera is inside of the
-/// shaft.
+/// Azimuth on the marker of the generatrix that faces the camera, [0, 2 pi). Nullopt for a camera inside of the shaft.
 std::optional<double> facing_tau_rad(const Marker& marker, const ShaftPose& pose);
 
 /// For the shaft through the RCM.
 ShaftPose pose_through_rcm(const Rigid3& camera_from_rcm, const JointVector& q);
 
-/// q of the shaft from the RCM to the marker's proximal end, with the pose's rotation about the axis. Nullopt where
-/// that end is the RCM.
+/// q of the shaft from the RCM to the marker's proximal end, with the pose's rotation. Nullopt where that is the RCM.
 std::optional<JointVector> configuration_of(const ShaftPose& pose, const Rigid3& camera_from_rcm);
 
 /// Unknowns of a fit, in this order: rotations about the unrolled frame's x and y [rad], translations along its x, y
