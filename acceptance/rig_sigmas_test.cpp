@@ -264,15 +264,18 @@ void track_by_calibrations(std::uint64_t seed, Row& row) {
   }
 }
 
-// LAPSERVO_SIGMA_LABORATORIES of them (1).
+// LAPSERVO_SIGMA_LABORATORIES of them (1). All frames of one share the errors of its calibrations, one draw of each:
+// only many have a spread.
 TEST(RigSigmas, OfALaboratorysOwnCalibrationsAreInQ) {
+  constexpr std::size_t many = 10;
   Row row;
-  for (const std::uint64_t seed : seeds_from_environment("LAPSERVO_SIGMA_LABORATORIES", "LAPSERVO_SIGMA_SEED"))
-    track_by_calibrations(seed, row);
+  const auto seeds = seeds_from_environment("LAPSERVO_SIGMA_LABORATORIES", "LAPSERVO_SIGMA_SEED");
+  for (const std::uint64_t seed : seeds) track_by_calibrations(seed, row);
   row.q.print("laboratories, q", row.told, row.frames), row.pose.print("laboratories, marker", row.told, row.frames);
   EXPECT_GE(row.told, 0.95 * row.frames);
   EXPECT_LT(row.q.worst(), 4.5);
   EXPECT_LT(row.pose.worst(), 4.5);
+  if (seeds.size() < many) return;
   row.q.expect(0.2, 1.4);
   row.pose.expect(0.2, 1.4);
 }
