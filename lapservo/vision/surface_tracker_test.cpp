@@ -253,18 +253,13 @@ std::vector<cv::Mat> rivals_that_change_places(const Rig& both, Random& random, 
 }
 
 // Without the RCM nothing says which of two prints is the instrument's, nor when the budget ends before both are looked
-// at, and the next frame has them in another order; nor does an RCM that both miss.
+// at, and the next frame has them in another order.
 TEST(SurfaceTracker, TwoOfTheSamePrintStayAmbiguousWithinAnyBudget) {
   Rig both = scenes::usual_rig(2);
   both.instruments[1].marker = both.instruments[0].marker;
   Random random(5);
-  int candidates = 0, alone = 0;
+  int candidates = 0;
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
-    Random places(seed);
-    const Rig moved = moved_by(0.03 * random_direction(places));
-    const auto q = apart(both, places);
-    EXPECT_NE(Tracker(moved).track(scenes::render(both, q, seed))[0].status, Status::ok) << seed;
-    alone += Tracker(moved).track(scenes::render(scenes::usual_rig(), {q[0]}, seed))[0].status == Status::ok;
     const auto frames = rivals_that_change_places(both, random, seed);
     for (const double frame_budget : {1, 1500, 3000, 5000}) {
       Tracker tracker(scenes::without_rcm(scenes::usual_rig()), {.frame_budget = frame_budget});
@@ -275,7 +270,7 @@ TEST(SurfaceTracker, TwoOfTheSamePrintStayAmbiguousWithinAnyBudget) {
       }
     }
   }
-  EXPECT_TRUE(candidates >= 30 && alone >= 2) << "the test's own power";
+  EXPECT_GE(candidates, 30) << "the test's own power";
 }
 
 // A rig a few millimetres off looks like a misprint: what needs no registration is given all the same.

@@ -127,11 +127,11 @@ Found detect(const SearchFrame& frame, bool through_rcm, BlobWalk& walk, WorkBud
   return best;
 }
 
-// Whether the marker shows elsewhere, too, more than a radius away: a second print, a reflection, an image of tiles.
-// Without the RCM, and all in one frame: in another a rival may be where none was. Nullopt: the budget ends first.
+// Whether the marker shows in another place as well: a second print, a reflection, an image of tiles. The RCM would
+// show which is ours. Places within a radius are one. All in one frame: in another a rival may be where none was.
+// Nullopt where the budget ends first.
 std::optional<bool> has_rival(const SearchFrame& frame, const FineFit& fit, WorkBudget& budget) {
-  Scene scene = frame.scene;
-  scene.registration = nullptr;
+  const Scene& scene = frame.scene;
   const auto middle = [&](const PoseUnknowns& unknowns) {
     return scene.camera.raw_from_point(point_on_axis(unknowns.pose(), scene.marker.length_m() / 2));
   };
@@ -205,13 +205,12 @@ Found MarkerSearch::look_without_rcm(const SearchFrame& frame, WorkBudget& budge
 Found MarkerSearch::despite_registration(const SearchFrame& frame, bool plain_is_known, WorkBudget& budget) {
   Found free = detect(frame, false, free_, budget);
   if (!free.fit || !free.fit->is_well_seen()) return {};
-  budget.allow(WorkBudget::Beyond::all);
-  BlobWalk again;
+  if (plain_is_known) return free;
   // In this frame a fit through the RCM may be possible where none was before.
-  if (!plain_is_known)
-    if (Found through_rcm = detect(frame, true, again, budget); through_rcm.fit) return through_rcm;
-  hidden_.done = has_rival(frame, *free.fit, budget) != false;  // where several show plainly, none is hidden
-  return hidden_.done ? refusal(Status::ambiguous, free.fit->unknowns) : free;
+  BlobWalk again;
+  budget.allow(WorkBudget::Beyond::all);
+  Found through_rcm = detect(frame, true, again, budget);
+  return through_rcm.fit ? through_rcm : free;
 }
 
 // The climb, and fits to its results. False when the budget ends first.
@@ -253,8 +252,7 @@ Found MarkerSearch::hidden(const SearchFrame& frame, WorkBudget& budget) {
 
 Found MarkerSearch::look_long(const SearchFrame& frame, bool is_mismatch, bool plain_is_known, WorkBudget& budget) {
   if (!free_.done)
-    if (Found found = despite_registration(frame, plain_is_known, budget); found.status != Status::no_marker)
-      return found;
+    if (Found found = despite_registration(frame, plain_is_known, budget); found.fit) return found;
   if (!free_.done) return {};
   other_bands_ = free_.other_bands;
   // Such a print is not hidden: this is what the search came to.
