@@ -143,32 +143,6 @@ TEST(RigSigmas, OfAPrintAreInPsi) {
   EXPECT_LT(row.q.of(3), 1.3);
 }
 
-// A print whose length is known to 0.4 %, its edges to 30 um to one another, and its boundaries to 5 um each.
-TEST(RigSigmas, OfAPrintsCovarianceAreInThePose) {
-  Rig truth = testing::paper_test_rig();
-  truth.instruments[0].marker.gap_rad = 0.1;
-  const PrintShape shape = PrintShape::of(truth.instruments[0].marker);
-  PrintNumbers longer, wrapped;
-  longer << shape.upper_m[1], shape.upper_m[2], shape.upper_m[3], 0, shape.lower_m[1], shape.lower_m[2],
-      shape.lower_m[3], 0;
-  longer *= 4e-3, wrapped << Eigen::Vector3d::Zero(), Eigen::Vector4d::Constant(0.03e-3), 0;
-  PrintNumbers each = PrintNumbers::Constant(5e-6);
-  each[7] = 0.01;
-  const Row row = tracked(truth, [&](Rig rig, Random& random) {
-    Marker& marker = rig.instruments[0].marker;
-    PrintNumbers change = random.normal() * longer + random.normal() * wrapped;
-    for (double& number : change) number += each[&number - change.data()] * random.normal();
-    marker = changed_by(shape, change).on(marker);
-    marker.covariance = longer * longer.transpose() + wrapped * wrapped.transpose();
-    marker.covariance->diagonal() += each.cwiseAbs2();
-    return rig;
-  });
-  row.q.print("covariance of a print", row.told, row.frames);
-  row.pose.print("the marker's pose", row.told, row.frames);
-  EXPECT_GE(row.told, 0.95 * row.frames);
-  row.q.expect(0.7, 1.3), row.pose.expect(0.7, 1.3);
-}
-
 // A marker whose diameter is known to 0.5 %, and the places of its edges to so much.
 TEST(RigSigmas, OfADiameterAndOfAPrintsEdgesAreInThePose) {
   Rig truth = testing::paper_test_rig();

@@ -22,10 +22,8 @@ FieldProblem problem(const std::string& field, double value, const std::string& 
 }  // namespace
 
 std::optional<double> Marker::measured_sigma_m() const {
-  const bool has_bands = sigmas.bands_upper_m && sigmas.bands_lower_m;
-  if (!covariance && !has_bands) return std::nullopt;
+  if (!sigmas.bands_upper_m || !sigmas.bands_lower_m) return std::nullopt;
   if (tolerance_m > 0) return tolerance_m;
-  if (covariance) return std::sqrt(covariance->diagonal().head<7>().mean());
   // Between what bands leave that were measured each by itself (0.9), and boundaries that were (0.7).
   constexpr double boundary_by_band = 0.8;
   double squares = 0;

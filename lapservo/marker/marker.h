@@ -6,8 +6,6 @@
 #include <optional>
 #include <string>
 
-#include <Eigen/Core>
-
 #include "lapservo/core/error.h"
 
 namespace lapservo {
@@ -34,8 +32,6 @@ struct Marker {
   double skew_m = 0;       ///< how much longer it is there: bands_lower_m add up to so much more than bands_upper_m
   double gap_rad = 0;      ///< what the print leaves bare
   MarkerSigmas sigmas{};
-  /// The places of boundaries e1, e2, e3 at tau = 0, of e0, e1, e2, e3 at the print's other end [m], and gap_rad.
-  std::optional<Eigen::Matrix<double, 8, 8>> covariance{};
 
   bool operator==(const Marker&) const = default;
   double radius_m() const { return diameter_m / 2; }

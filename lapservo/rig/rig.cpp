@@ -269,7 +269,7 @@ MarkerSigmas parse_marker_sigmas(const YamlField& marker) {
 }
 
 Marker parse_marker(const YamlField& field) {
-  expect_keys(field, {{"covariance"},
+  expect_keys(field, {{},
                       {"diameter_m", "hues_deg", "bands_upper_m", "bands_lower_m", "seam_rad", "wrap_m", "skew_m",
                        "gap_rad", "tolerance_m"}});
   Marker marker;
@@ -285,9 +285,6 @@ Marker parse_marker(const YamlField& field) {
   if (const YamlField skew = field["skew_m"]; skew.present()) marker.skew_m = skew.number("a length in metres");
   if (const YamlField gap = field["gap_rad"]; gap.present()) marker.gap_rad = gap.number("an angle in radians");
   marker.sigmas = parse_marker_sigmas(field);
-  if (const YamlField covariance = field["covariance"]; covariance.present())
-    marker.covariance = parse_covariance(
-        covariance, 8, "64 numbers, a covariance of e1 e2 e3 at tau = 0, e0 e1 e2 e3 at the other end [m], gap [rad]");
   if (marker.sigmas.bands_upper_m.has_value() != marker.sigmas.bands_lower_m.has_value())
     field.fail("measured at one end alone", "sigma_bands_upper_m and sigma_bands_lower_m, both or neither");
   if (const auto problem = marker_problem(marker)) field.fail_within(*problem);

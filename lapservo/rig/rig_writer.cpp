@@ -251,7 +251,6 @@ std::string marker_yaml(const Marker& marker, int indent) {
   lines.add_unless_zero("skew_m", marker.skew_m, sigmas.skew_m);
   lines.add_unless_zero("gap_rad", marker.gap_rad, sigmas.gap_rad);
   lines.add_unless_zero("tolerance_m", marker.tolerance_m, sigmas.tolerance_m);
-  if (marker.covariance) lines.add("covariance", covariance_text(*marker.covariance));
   return lines.text();
 }
 

@@ -110,7 +110,6 @@ TEST(RigWriter, WhatItWritesReadsBackToTheLastBit) {
         {random.uniform(-1, 1), 1.0 / 3, -0.0}};
     instrument.registration_covariance = random_covariance<6>(random);
     if (i % 2 != 0) rig.camera.covariance = random_covariance<9>(random);
-    if (i % 2 != 0) instrument.marker.covariance = random_covariance<8>(random);
     instrument.joints->offset = {0, 1.0 / 3, -0.0, random.normal()};
     ASSERT_EQ(written_and_read(rig), rig) << rig_yaml(rig);
   }

@@ -34,7 +34,7 @@ struct Members {
   }
   static auto of(Marker& v) {
     return std::tie(v.diameter_m, v.hues_deg, v.bands_upper_m, v.bands_lower_m, v.seam_rad, v.tolerance_m, v.wrap_m,
-                    v.skew_m, v.gap_rad, v.sigmas, v.covariance);
+                    v.skew_m, v.gap_rad, v.sigmas);
   }
   static auto of(Joints& v) { return std::tie(v.names, v.sign, v.offset, v.sigma_offset); }
   static auto of(WristJoint& v) {

@@ -18,7 +18,7 @@ Rig free_rig(Rig rig, double tolerance_m, double focal_change) {
   for (Instrument& instrument : rig.instruments) {
     instrument.camera_from_rcm.reset();
     instrument.marker.tolerance_m = tolerance_m > 0 ? std::max(instrument.marker.tolerance_m, tolerance_m) : 0;
-    instrument.marker.sigmas = {}, instrument.marker.covariance.reset();
+    instrument.marker.sigmas = {};
   }
   rig.camera.sigmas = {}, rig.camera.covariance.reset(), rig.camera.response.sigma.reset();
   rig.camera.fx_px *= 1 + focal_change, rig.camera.fy_px *= 1 + focal_change;

@@ -10,7 +10,6 @@
 
 #include "lapservo/calibration/marker/print_adjustment.h"
 #include "lapservo/core/angles.h"
-#include "lapservo/core/rounded_covariance.h"
 #include "lapservo/core/statistics.h"
 #include "lapservo/marker/decoder.h"
 #include "lapservo/vision/edges/edge_measurements.h"
@@ -355,10 +354,8 @@ MarkerCalibration calibrate_marker(const Rig& rig, std::size_t instrument, std::
   calibration.after_px = summary_of(*last, fit.measured(), fit.marker(), 2).rms_px;
   calibration.faults = texts_of(last->faults, first_s);
   calibration.marker = fit.marker();
-  PrintCovariance covariance = *last->covariance;
-  if (no_gap_sigma_rad) covariance(print_numbers - 1, print_numbers - 1) = *no_gap_sigma_rad * *no_gap_sigma_rad;
-  calibration.marker.sigmas = sigmas_of(covariance, nominal.sigmas);
-  calibration.marker.covariance = rounded_covariance(covariance);
+  calibration.marker.sigmas = sigmas_of(*last->covariance, nominal.sigmas);
+  if (no_gap_sigma_rad) calibration.marker.sigmas.gap_rad = no_gap_sigma_rad;
   calibration.marker.tolerance_m = tolerance_of(PrintShape::of(fit.marker()), *last->covariance, fit.marker());
   if (calibration.marker.tolerance_m > max_tolerance_m)
     return refused(

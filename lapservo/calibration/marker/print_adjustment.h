@@ -27,7 +27,7 @@ struct PrintShape {
 /// [rad].
 inline constexpr int print_numbers = 8;
 using PrintNumbers = Eigen::Matrix<double, print_numbers, 1>;
-using PrintCovariance = decltype(Marker::covariance)::value_type;
+using PrintCovariance = Eigen::Matrix<double, print_numbers, print_numbers>;
 
 PrintShape changed_by(const PrintShape& shape, const PrintNumbers& change);
 

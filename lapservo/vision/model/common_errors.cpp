@@ -89,42 +89,20 @@ ResidualLine line_of(std::span<const Measurement> measurements, std::size_t grou
   return line;
 }
 
-template <typename Matrix>
-Matrix root_of(const Matrix& covariance) {
-  const Eigen::LDLT<Matrix> parts(covariance);
-  const Matrix lower = parts.matrixL();
-  return parts.transpositionsP().transpose() * (lower * parts.vectorD().cwiseMax(0).cwiseSqrt().asDiagonal());
-}
-
 // A root of the camera's covariance.
 RigErrors::CameraRoot root_of_covariance(const Camera& camera) {
   RigErrors::CameraRoot root = RigErrors::CameraRoot::Zero();
   if (camera.covariance) {
-    root.leftCols<RigErrors::camera_numbers>() = root_of(*camera.covariance);
+    const Eigen::LDLT<RigErrors::CameraCovariance> parts(*camera.covariance);
+    const RigErrors::CameraCovariance lower = parts.matrixL();
+    root.leftCols<RigErrors::camera_numbers>() =
+        parts.transpositionsP().transpose() * (lower * parts.vectorD().cwiseMax(0).cwiseSqrt().asDiagonal());
     return root;
   }
   const CameraSigmas& sigma = camera.sigmas;
   root.diagonal() << std::sqrt(2.0 / 3) * sigma.fx_px, std::sqrt(2.0 / 3) * sigma.fy_px, sigma.cx_px, sigma.cy_px,
       Eigen::Map<const Eigen::Matrix<double, 5, 1>>(sigma.distortion.data());
   root.rightCols<1>().head<2>() << std::sqrt(1.0 / 3) * sigma.fx_px, std::sqrt(1.0 / 3) * sigma.fy_px;
-  return root;
-}
-
-// A root of the print's covariance.
-RigErrors::PrintCovariance root_of_print(const Marker& marker) {
-  if (marker.covariance) return root_of(*marker.covariance);
-  const MarkerSigmas& sigmas = marker.sigmas;
-  RigErrors::PrintCovariance root = RigErrors::PrintCovariance::Zero();
-  if (marker.measured_sigma_m()) {
-    const double upper = common_part(marker.bands_upper_m, *sigmas.bands_upper_m),
-                 lower = common_part(marker.bands_lower_m, *sigmas.bands_lower_m);
-    const std::array<double, 4> upper_m = boundaries_m(marker, 0);
-    double end_m = 0;
-    for (std::size_t k = 0; k < 3; ++k) root(k, 0) = upper * upper_m[k + 1];
-    for (std::size_t k = 0; k < 3; ++k) root(4 + k, 0) = lower * (end_m += marker.bands_lower_m[k]);
-  }
-  root.col(1).segment<4>(3).setConstant(sigmas.wrap_m.value_or(0));
-  root(7, 2) = sigmas.gap_rad.value_or(0);
   return root;
 }
 
@@ -197,32 +175,33 @@ bool has_sigmas(const Camera& camera, const Marker& marker) {
   CameraSigmas geometry = camera.sigmas;
   geometry.blue = geometry.red = 0;
   return geometry != CameraSigmas{} || camera.covariance || camera.response.sigma || marker.measured_sigma_m() ||
-         marker.covariance || marker.sigmas.diameter_m || marker.sigmas.wrap_m || marker.sigmas.gap_rad;
+         marker.sigmas.diameter_m || marker.sigmas.wrap_m || marker.sigmas.gap_rad;
 }
 
 RigErrors::RigErrors(const Camera& camera, const Marker& marker, const ShaftPose& pose,
                      const std::array<double, 4>& by_exponent_px)
     : camera_(&camera), camera_root_(root_of_covariance(camera)) {
-  const double wider = marker.sigmas.diameter_m.value_or(0) / marker.diameter_m;
+  const MarkerSigmas& sigmas = marker.sigmas;
+  const bool measured = marker.measured_sigma_m().has_value();
+  const double upper = measured ? common_part(marker.bands_upper_m, *sigmas.bands_upper_m) : 0,
+               lower = measured ? common_part(marker.bands_lower_m, *sigmas.bands_lower_m) : 0,
+               wrap_m = sigmas.wrap_m.value_or(0), gap_rad = sigmas.gap_rad.value_or(0),
+               wider = sigmas.diameter_m.value_or(0) / marker.diameter_m;
   // A thicker shaft looks like a nearer one whose print is shorter, unless that was measured in diameters.
-  const double shorter = marker.measured_sigma_m() ? 0 : wider;
   const Rigid3& placed = pose.camera_from_unrolled;
   nearer_m_ = wider * (placed.rotation.conjugate() * placed.translation);
-  const PrintCovariance print = root_of_print(marker);
   const std::array<double, 4> upper_m = boundaries_m(marker, 0), slopes_m = boundary_slopes_m(marker);
   // One sigma of the exponent by which light may be off: v^(1 + x) differs from v by x v ln(v), by 0.28 x at most
   // beside what another exposure makes of it.
   constexpr double value_by_exponent = 0.28;
   const double sigma_exponent = camera.response.sigma.value_or(0) / value_by_exponent;
-  for (int k = 0; k < 4; ++k) {
-    const auto boundary = static_cast<std::size_t>(k);
-    response_px_[boundary] = sigma_exponent * by_exponent_px[boundary];
-    const double slope_m = slopes_m[boundary], lower_m = upper_m[boundary] + marker.covered_rad() * slope_m;
-    // A wider gap brings the print's lower edge nearer.
-    for (int i = 0; i < of_print; ++i)
-      along_m_[static_cast<std::size_t>(i)][boundary] = {k > 0 ? print(k - 1, i) : 0,
-                                                         print(3 + k, i) + print(7, i) * slope_m};
-    along_m_[of_print][boundary] = shorter * Eigen::Vector2d(upper_m[boundary], lower_m);
+  for (std::size_t k = 0; k < upper_m.size(); ++k) {
+    response_px_[k] = sigma_exponent * by_exponent_px[k];
+    const double lower_m = upper_m[k] + marker.covered_rad() * slopes_m[k];
+    along_m_[0][k] = {upper * upper_m[k], lower * (lower_m - marker.wrap_m)};
+    along_m_[1][k] = {0, wrap_m};
+    along_m_[2][k] = {0, gap_rad * slopes_m[k]};
+    along_m_[3][k] = (measured ? 0 : wider) * Eigen::Vector2d(upper_m[k], lower_m);
   }
 }
 
@@ -241,15 +220,13 @@ RigErrors::Shifts RigErrors::of(const Measurement& measurement) const {
   by_number_px << normal.array() * bent, normal, distorted(x * r2, y * r2), distorted(x * r2 * r2, y * r2 * r2),
       distorted(2 * x * y, r2 + 2 * y * y), distorted(r2 + 2 * x * x, 2 * x * y),
       distorted(x * r2 * r2 * r2, y * r2 * r2 * r2);
-  const bool is_boundary = measurement.group < response_px_.size();
+  const bool of_print = measurement.group < response_px_.size();
   const double turned = measurement.turn_fraction;
   const Eigen::Vector2d edges = measurement.along_px_per_m * Eigen::Vector2d(1 - turned, turned);
+  const auto of_print_px = [&](std::size_t i) { return of_print ? edges.dot(along_m_[i][measurement.group]) : 0; };
   Shifts shifts;
-  shifts.head<of_camera>() = camera_root_.transpose() * by_number_px;
-  shifts[of_camera] = is_boundary ? response_px_[measurement.group] : 0;
-  for (std::size_t i = 0; i < along_m_.size(); ++i)
-    shifts[of_camera + 1 + static_cast<int>(i)] = is_boundary ? edges.dot(along_m_[i][measurement.group]) : 0;
-  shifts[most - 1] += measurement.row.segment<3>(2).dot(nearer_m_);
+  shifts << camera_root_.transpose() * by_number_px, of_print ? response_px_[measurement.group] : 0, of_print_px(0),
+      of_print_px(1), of_print_px(2), of_print_px(3) + measurement.row.segment<3>(2).dot(nearer_m_);
   return shifts;
 }
 

@@ -74,17 +74,15 @@ inline constexpr UsualErrors usual_errors;
 
 /// How far one sigma of each number of the rig's camera, and of the marker's length, wrap, gap and diameter, moves
 /// measurements [px], to first order. A camera without a covariance has independent numbers, but for the two focal
-/// lengths, a third of whose variance is common: mostly they have all of it in common, but the rig does not say. A
-/// print without one has bands whose errors have most in common: they count as one of its length, beside what they
-/// leave of each boundary (Marker::boundary_sigma_m()). Images show lengths in diameters, and so a measured print is
-/// known: its lengths err with the diameter, beside their own sigmas. Those of another one are known in metres.
+/// lengths, a third of whose variance is common: mostly they have all of it in common, but the rig does not say. The
+/// errors of a print's bands have most in common: they count as one of its length, beside what they leave of each
+/// boundary (Marker::boundary_sigma_m()). Images show lengths in diameters, and so a measured print is known: its
+/// lengths err with the diameter, beside their own sigmas. Those of another one are known in metres.
 class RigErrors {
  public:
   using CameraCovariance = decltype(Camera::covariance)::value_type;
-  using PrintCovariance = decltype(Marker::covariance)::value_type;
   static constexpr int camera_numbers = CameraCovariance::RowsAtCompileTime, of_camera = camera_numbers + 1,
-                       of_print = PrintCovariance::RowsAtCompileTime,
-                       most = of_camera + 1 + of_print + 1;  ///< one of the response, one of the diameter
+                       of_marker = 4, most = of_camera + 1 + of_marker;  ///< one of the response
   using CameraRoot = Eigen::Matrix<double, camera_numbers, of_camera>;
   using Shifts = Eigen::Matrix<double, most, 1>;
 
@@ -92,7 +90,6 @@ class RigErrors {
   RigErrors(const Camera& camera, const Marker& marker, const ShaftPose& pose,
             const std::array<double, 4>& by_exponent_px);
 
-  static constexpr bool is_of_print(int shift) { return shift > of_camera && shift <= of_camera + of_print; }
   /// Zero for numbers without a sigma.
   Shifts of(const Measurement& measurement) const;
 
@@ -100,8 +97,8 @@ class RigErrors {
   const Camera* camera_;
   CameraRoot camera_root_;  ///< of Camera::covariance
   std::array<double, 4> response_px_{};
-  /// How far the print's numbers and the diameter move each boundary: at the print's upper edge, at its lower one.
-  std::array<std::array<Eigen::Vector2d, 4>, of_print + 1> along_m_{};
+  /// How far length, wrap, gap and diameter move each boundary: at the print's upper edge, at its lower one.
+  std::array<std::array<Eigen::Vector2d, 4>, of_marker> along_m_{};
   Eigen::Vector3d nearer_m_;  ///< by the diameter, in the unrolled frame's axes
 };
 

@@ -100,22 +100,20 @@ void add_pulls_of_all(std::span<const Measurement> measurements, const CommonErr
 }
 
 // One sigma of each number of the rig's camera and marker.
-void add_pulls_of_rig(std::span<const Measurement> measurements, const CommonErrors& errors, PrintSums& sums) {
-  std::array<RigPull, RigErrors::most> pulls;
+void add_pulls_of_camera(std::span<const Measurement> measurements, const CommonErrors& errors, PrintSums& sums) {
+  std::array<CameraPull, RigErrors::most> pulls;
   for (const Measurement& m : measurements) {
     const RigErrors::Shifts shifts = certainty_of(m, errors) * errors.rig->of(m);
     for (int i = 0; i < RigErrors::most; ++i) {
-      RigPull& pull = pulls[static_cast<std::size_t>(i)];
+      CameraPull& pull = pulls[static_cast<std::size_t>(i)];
       pull.add(m, shifts[i]);
       pull.by_group[m.group] += shifts[i];
     }
   }
-  for (int i = 0; i < RigErrors::most; ++i) {
-    RigPull& pull = pulls[static_cast<std::size_t>(i)];
+  for (CameraPull& pull : pulls) {
     if (pull.x.isZero(0)) continue;  // the rig has no sigma of it
     pull.error_px = 1;
-    pull.of_print = RigErrors::is_of_print(i);
-    sums.rig.push_back(pull);
+    sums.camera.push_back(pull);
   }
 }
 
@@ -124,7 +122,7 @@ double certainty_of(const GroupPull& group) {
 }
 
 // How one sigma of a number of the rig pulls the print's errors, whatever pose, film and groups' errors are.
-PrintVector print_pull_of(const RigPull& pull, const PrintSums& sums, const PrintCrossMatrix& through) {
+PrintVector print_pull_of(const CameraPull& pull, const PrintSums& sums, const PrintCrossMatrix& through) {
   UnknownVector x = pull.x;
   PrintVector n = pull.n;
   for (std::size_t group = 0; group < measurement_groups; ++group) {
@@ -137,13 +135,13 @@ PrintVector print_pull_of(const RigPull& pull, const PrintSums& sums, const Prin
 }
 
 // Errors of the print that look like one sigma of each number of the rig.
-InplaceVector<PrintVector, RigErrors::most> shapes_of_rig(const PrintInformation& print, const PrintSums& sums,
-                                                          const PrintCrossMatrix& through) {
+InplaceVector<PrintVector, RigErrors::most> shapes_of_camera(const PrintInformation& print, const PrintSums& sums,
+                                                             const PrintCrossMatrix& through) {
   PrintMatrix solvable = print.information;
   solvable.diagonal().array() += ridge * print.information.trace();
   const Eigen::LDLT<PrintMatrix> factor(solvable);
   InplaceVector<PrintVector, RigErrors::most> shapes;
-  for (const RigPull& pull : sums.rig) shapes.push_back(factor.solve(print_pull_of(pull, sums, through)));
+  for (const CameraPull& pull : sums.camera) shapes.push_back(factor.solve(print_pull_of(pull, sums, through)));
   return shapes;
 }
 
@@ -159,7 +157,7 @@ PrintSums print_sums(std::span<const Measurement> measurements, double film_prio
   }
   sums.equations.add(UnknownVector::Unit(film_unknown), PrintVector::Zero(), 1, film_prior);
   if (errors.whole_px > 0 || errors.leaning_px > 0 || errors.bowed_px > 0) add_pulls_of_all(measurements, errors, sums);
-  if (errors.rig) add_pulls_of_rig(measurements, errors, sums);
+  if (errors.rig) add_pulls_of_camera(measurements, errors, sums);
   return sums;
 }
 
@@ -177,10 +175,10 @@ PrintInformation information_of(const PrintSums& sums) {
   if (!inverse) return {};
   const PrintCrossMatrix through = e.nx.lazyProduct(*inverse);
   const PrintInformation print{e.nn - through.lazyProduct(e.nx.transpose()), e.n - through.lazyProduct(e.x)};
-  return sums.rig.empty() ? print : doubted(print, shapes_of_rig(print, sums, through));
+  return sums.camera.empty() ? print : doubted(print, shapes_of_camera(print, sums, through));
 }
 
-std::optional<PrintSolution> solved_with_print(const PrintSums& sums, const PrintPrior& prior, bool is_exact) {
+std::optional<PrintSolution> solved_with_print(const PrintSums& sums, const PrintPrior& prior) {
   const PrintEquations& e = sums.equations;
   const PrintMatrix print_covariance = covariance_of(e.nn, prior);
   const PrintCrossMatrix by_x = print_covariance.lazyProduct(e.nx);
@@ -192,19 +190,13 @@ std::optional<PrintSolution> solved_with_print(const PrintSums& sums, const Prin
   solution.step = inverse * (e.x - by_x.transpose() * e.n);
   solution.print_mm = print_covariance * (e.n - e.nx * solution.step);
   solution.covariance = inverse;
-  if (prior.measured_mm > 0) {
-    const Eigen::Matrix<double, fit_unknowns, print_errors> by_print =
-        prior.measured_mm * (inverse * (e.nx.transpose() - by_x.transpose() * e.nn));
-    solution.covariance.noalias() -= by_print * by_print.transpose();
-  }
   const auto widen = [&](const GroupPull& pull) {
     const UnknownVector error = pull.error_px * (inverse * (pull.x - by_x.transpose() * pull.n));
     solution.covariance.noalias() += error * error.transpose();
   };
   for (const GroupPull& pull : sums.pulls) widen(pull);
   for (const GroupPull& pull : sums.of_all_boundaries) widen(pull);
-  for (const RigPull& pull : sums.rig)
-    if (!(is_exact && pull.of_print)) widen(pull);
+  for (const CameraPull& pull : sums.camera) widen(pull);
   const bool finite = solution.covariance.allFinite() && solution.step.allFinite() && solution.print_mm.allFinite();
   return finite && (solution.covariance.diagonal().array() > 0).all() ? std::optional(solution) : std::nullopt;
 }

@@ -56,8 +56,7 @@ struct GroupPull {
 };
 
 /// The effect of one sigma of a number of the rig's camera or marker on the measurements of all groups.
-struct RigPull : GroupPull {
-  bool of_print = false;
+struct CameraPull : GroupPull {
   std::array<double, measurement_groups> by_group{};  ///< sums of weights times what it moves
 };
 
@@ -66,7 +65,7 @@ struct PrintSums {
   PrintEquations equations;
   std::array<GroupPull, measurement_groups> pulls;
   InplaceVector<GroupPull, 3> of_all_boundaries;
-  InplaceVector<RigPull, RigErrors::most> rig;
+  InplaceVector<CameraPull, RigErrors::most> camera;
 };
 
 /// Weighted robustly about the errors' lines. `film_prior` as the fit has it.
@@ -94,8 +93,7 @@ struct PrintSolution {
   UnknownMatrix covariance = UnknownMatrix::Zero();
 };
 
-/// The likeliest pose when the print's errors are so, and how sure it is; where `is_exact`, without the errors of the
-/// print that the rig gives sigmas. Nullopt when a direction is not seen at all.
-std::optional<PrintSolution> solved_with_print(const PrintSums& sums, const PrintPrior& prior, bool is_exact = false);
+/// The likeliest pose when the print's errors are so, and how sure it is. Nullopt when a direction is not seen at all.
+std::optional<PrintSolution> solved_with_print(const PrintSums& sums, const PrintPrior& prior);
 
 }  // namespace lapservo::internal

@@ -47,9 +47,9 @@ PrintInformation doubted(PrintInformation print, std::span<const PrintVector> sh
 
 /// How large the print's errors are (one sigma) [mm]: each by itself, and both inner boundaries' alike, since the
 /// middle ink lies aside, which looks most like a turn. Their covariance is bands^2 I + ink^2 c c^T, c the inner
-/// boundaries' shift. `measured_mm`, a part of the bands' size, weighs measurements only: RigErrors has these errors.
+/// boundaries' shift.
 struct PrintPrior {
-  double bands_mm = 0, ink_mm = 0, measured_mm = 0;
+  double bands_mm = 0, ink_mm = 0;
 };
 
 /// The covariance of the print's errors that a prior and the information, in which no boundary has to do with another,

@@ -24,7 +24,7 @@ using Hypotheses = InplaceVector<Hypothesis, hypotheses>;
 
 // The first is the rig's print. Every print's bands are off by what the rig says of them.
 Hypotheses prior_hypotheses(const Marker& marker, bool is_known) {
-  const double tolerance_mm = marker.boundary_sigma_m() / mm_in_m, measured_mm = marker.covariance ? tolerance_mm : 0;
+  const double tolerance_mm = marker.boundary_sigma_m() / mm_in_m;
   const bool is_measured = marker.measured_sigma_m().has_value();
   const auto with_none = [&](std::span<const ErrorSize> sizes) {
     InplaceVector<ErrorSize, 1 + limits.bands.size()> all;
@@ -40,7 +40,7 @@ Hypotheses prior_hypotheses(const Marker& marker, bool is_known) {
   Hypotheses all;
   for (const ErrorSize& bands : with_none(limits.bands))
     for (const ErrorSize& ink : with_none(limits.inks))
-      all.push_back({{std::hypot(bands.mm, tolerance_mm), ink.mm, measured_mm},
+      all.push_back({{std::hypot(bands.mm, tolerance_mm), ink.mm},
                      std::max(bands.mm, ink.mm) >= limits.off_mm,
                      bands.fraction * ink.fraction});
   return all;
@@ -149,8 +149,7 @@ std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const std
   const PrintSums sums = fit.through_rcm ? held(by_image, rcm->measurement) : by_image;
   const auto print = mixed(sums, prior, errors.doubt, marker);
   if (!print) return std::nullopt;
-  const bool is_exact = !(prior[0].prior.bands_mm > 0) && sums.rig.empty();
-  const auto exact = is_exact ? print->as_the_rig_says : solved_with_print(sums, {}, true);
+  const auto exact = prior[0].prior.bands_mm > 0 ? solved_with_print(sums, {}) : print->as_the_rig_says;
   // Where the passes ended, and the measurements were taken.
   const bool as_passes = !rcm || rcm->held_by_passes == fit.through_rcm;
   const auto settled =
