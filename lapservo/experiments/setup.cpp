@@ -7,6 +7,8 @@
 #include <thread>
 #include <utility>
 
+#include "lapservo/rig/instruments.h"
+
 namespace lapservo::internal {
 
 Rig without_registration(Rig rig) {
@@ -15,14 +17,8 @@ Rig without_registration(Rig rig) {
 }
 
 Rig known_exactly(Rig rig) {
-  rig.camera.sigmas = {}, rig.camera.covariance.reset();
-  rig.camera.response.sigma.reset(), rig.camera.response.sigma_light.clear(), rig.camera.response.sigma_value.clear();
-  for (Instrument& instrument : rig.instruments) {
-    instrument.sigma_translation_m.reset(), instrument.sigma_quaternion_xyzw.reset();
-    instrument.registration_covariance.reset(), instrument.sigma_image_delay_s.reset();
-    instrument.marker.sigmas = {}, instrument.marker.tolerance_m = 0;
-    if (instrument.joints) instrument.joints->sigma_offset.reset();
-  }
+  rig = without_sigmas(std::move(rig));
+  for (Instrument& instrument : rig.instruments) instrument.marker.tolerance_m = 0;
   return rig;
 }
 

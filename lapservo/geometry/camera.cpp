@@ -28,6 +28,16 @@ Distorted distort(const std::array<double, 5>& k, const Eigen::Vector2d& x) {
 
 }  // namespace
 
+Eigen::Matrix<double, 9, 9> Camera::known_covariance() const {
+  if (covariance) return *covariance;
+  Eigen::Vector<double, 9> by_sigmas;
+  by_sigmas << sigmas.fx_px, sigmas.fy_px, sigmas.cx_px, sigmas.cy_px,
+      Eigen::Map<const Eigen::Vector<double, 5>>(sigmas.distortion.data());
+  Eigen::Matrix<double, 9, 9> known = by_sigmas.cwiseAbs2().asDiagonal();
+  known(0, 1) = known(1, 0) = sigmas.fx_px * sigmas.fy_px / 3;
+  return known;
+}
+
 bool Camera::contains(const Eigen::Vector2d& raw_px, double margin_px) const {
   return raw_px.x() >= margin_px && raw_px.y() >= margin_px && raw_px.x() <= width_px - 1 - margin_px &&
          raw_px.y() <= height_px - 1 - margin_px;

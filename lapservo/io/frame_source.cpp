@@ -2,7 +2,10 @@
 
 #include <array>
 #include <chrono>
+#include <cstdint>
 #include <fstream>
+#include <span>
+#include <string>
 #include <string_view>
 #include <system_error>
 #include <utility>
@@ -12,8 +15,10 @@
 #include <fmt/ranges.h>
 
 #include "lapservo/core/error.h"
+#include "lapservo/core/input_file.h"
 #include "lapservo/io/image_file.h"
 #include "lapservo/io/pictures/picture_order.h"
+#include "lapservo/io/pictures/picture_parts.h"
 #include "lapservo/io/pictures/png_picture.h"
 #include "lapservo/io/video/video_reader.h"
 
@@ -61,8 +66,10 @@ class PictureSource : public FrameSource {
   std::optional<Frame> next() override {
     if (next_ == files_.size()) return std::nullopt;
     const fs::path& file = files_[next_];
-    Picture picture = read_picture(file);
-    if (const auto transfer = transfer_in(file); !picture.flaw && transfer != transfer_)
+    const std::string content = read_input(file, max_picture_bytes, "an image");
+    const std::span bytes(reinterpret_cast<const std::uint8_t*>(content.data()), content.size());
+    Picture picture = decode_picture(bytes, file.string());
+    if (const auto transfer = png_transfer(bytes); !picture.flaw && transfer != transfer_)
       throw InputError(file.string(), "transfer", name_of(transfer),
                        fmt::format("{} as in {}: put the images of each encoding into a folder of its own",
                                    name_of(transfer_), files_.front().filename().string()));

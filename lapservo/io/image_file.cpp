@@ -24,7 +24,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::uint32_t max_side_px = 16384;
-constexpr std::size_t max_bytes = std::size_t{256} << 20;
 
 struct PictureSize {
   std::uint32_t width_px = 0, height_px = 0;
@@ -177,7 +176,7 @@ cv::Mat decode_image(std::span<const std::uint8_t> bytes, const std::string& sou
 }
 
 Picture read_picture(const fs::path& path) {
-  const std::string bytes = read_input(path, max_bytes, "an image");
+  const std::string bytes = read_input(path, max_picture_bytes, "an image");
   return decode_picture({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()}, path.string());
 }
 

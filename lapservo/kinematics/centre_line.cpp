@@ -63,11 +63,7 @@ std::optional<Eigen::Vector2d> projected_rcm_px(const Camera& camera, const Rigi
 Eigen::Matrix2d projected_rcm_covariance_px2(const Camera& camera, const Rigid3& camera_from_rcm,
                                              const Eigen::Matrix3d& place_covariance_m2) {
   const Eigen::Vector3d& rcm = camera_from_rcm.translation;
-  const CameraSigmas& sigma = camera.sigmas;
-  Eigen::Matrix4d of_matrix =
-      Eigen::Vector4d(sigma.fx_px, sigma.fy_px, sigma.cx_px, sigma.cy_px).cwiseAbs2().asDiagonal();
-  of_matrix(0, 1) = of_matrix(1, 0) = sigma.fx_px * sigma.fy_px / 3;  // as Camera::covariance says
-  if (camera.covariance) of_matrix = camera.covariance->topLeftCorner<4, 4>();
+  const Eigen::Matrix4d of_matrix = camera.known_covariance().topLeftCorner<4, 4>();
   Eigen::Matrix<double, 2, 4> by_matrix;
   by_matrix << rcm.x() / rcm.z(), 0, 1, 0, 0, rcm.y() / rcm.z(), 0, 1;
   const Eigen::Matrix<double, 2, 3> by_place = camera.ideal_with_jacobian(rcm).d_px_d_point;

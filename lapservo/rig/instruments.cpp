@@ -24,6 +24,18 @@ Rig single_instrument(Rig rig, const std::string& source) {
   return rig;
 }
 
+Rig without_sigmas(Rig rig) {
+  rig.camera.sigmas = {}, rig.camera.covariance.reset();
+  rig.camera.response.sigma.reset(), rig.camera.response.sigma_light.clear(), rig.camera.response.sigma_value.clear();
+  for (Instrument& instrument : rig.instruments) {
+    instrument.sigma_translation_m.reset(), instrument.sigma_quaternion_xyzw.reset();
+    instrument.registration_covariance.reset(), instrument.sigma_image_delay_s.reset();
+    instrument.marker.sigmas = {};
+    if (instrument.joints) instrument.joints->sigma_offset.reset();
+  }
+  return rig;
+}
+
 std::optional<std::size_t> instrument_index(const Rig& rig, std::string_view name) {
   for (std::size_t i = 0; i < rig.instruments.size(); ++i)
     if (rig.instruments[i].name == name) return i;

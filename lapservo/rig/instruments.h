@@ -19,6 +19,9 @@ void require_registration(const Rig& rig, const std::string& source);
 /// is missing.
 Rig single_instrument(Rig rig, const std::string& source);
 
+/// Without its `sigma_` keys and covariances, but for those of tools.
+Rig without_sigmas(Rig rig);
+
 /// Place in Rig::instruments of the one with this name.
 std::optional<std::size_t> instrument_index(const Rig& rig, std::string_view name);
 

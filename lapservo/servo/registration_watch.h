@@ -27,9 +27,9 @@ class RegistrationWatch {
     if (first) seen_.clear();
     return first;
   }
-  static constexpr int frames = 5;  ///< informative frames
 
  private:
+  static constexpr int frames = 5;  // informative ones
   struct Seen {
     int passing = 0, missing = 0, absent = 0;  // frames in a row
     int since_first = 0;                       // frames since the first of those that miss

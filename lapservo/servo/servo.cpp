@@ -53,8 +53,7 @@ std::string remedy_of(const ControlStep& control, const std::array<std::string, 
       return "images and joints agree at no delay up to 0.3 s: check whose image it is, or give delay_s";
     case HoldReason::tip_open:
       return "the tool, bent as it is, leaves the tip open by more than 3 mm: straighten the wrist, or measure the "
-             "tool "
-             "by lapservo calibrate tip --touch with a bent wrist";
+             "tool by lapservo calibrate tip --touch with a bent wrist";
     case HoldReason::tip_unreachable:
       return "the shaft can't hold the tip at its goal with the wrist as it is: straighten the wrist, or give another "
              "goal";

@@ -128,9 +128,8 @@ is sent.)");
            py::arg("instrument") = py::none(), py::keep_alive<1, 5>(),
            "arm: its namespace, 'PSM1'; rig: with the arm's joints, whose first instrument has the arm's name, or that "
            "of `instrument`; controller: of this rig, whose limits no setpoint exceeds, of joint_limits; "
-           "enable_motion: else "
-           "nothing is sent; setpoint_readers: nodes that may read servo_jp, the "
-           "arm's and others; wait_s: for the arm's joints, without which InputError is raised.")
+           "enable_motion: else nothing is sent; setpoint_readers: nodes that may read servo_jp, the arm's and others; "
+           "wait_s: for the arm's joints, without which InputError is raised.")
       .def(
           "state", [](Ros2Robot& self) { return unlocked([&] { return loop_asks ? self.state() : self.latest(); }); },
           "JointState as it is now, in any thread. A short fault is reported to run() alone, also through the state() "
@@ -141,8 +140,7 @@ is sent.)");
             return pairs_of(unlocked([&] { return loop_asks ? self.readings() : self.latest_readings(); }));
           },
           "list of (time_s, float[4]): all since run() took them last, the newest 1000, in any thread. They stay for "
-          "run(), "
-          "also through the readings() of a Robot that passes this one's on.");
+          "run(), also through the readings() of a Robot that passes this one's on.");
   refuse_subclasses(robot, "Robot");
   py::class_<Ros2Camera, ImageStream> camera(m, "Ros2Camera", "The newest image of a topic of ROS 2.");
   camera

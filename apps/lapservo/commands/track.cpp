@@ -406,8 +406,7 @@ class TrackRun {
         wrists_.push_back(live_wrist_ ? WristInput{std::nullopt, other_wrist_text(options_.joints, *rigs_.rig(), i)}
                                       : find_wrist_input(options_.input, options_.joints, options_.joint_topic,
                                                          *rigs_.rig(), i, &source_, &options_.image_topic));
-        if (const std::string why = no_tip_text(instrument, wrists_[i]); !why.empty())
-          std::fprintf(stderr, "lapservo: %s: no tip: %s\n", instrument.name.c_str(), why.c_str());
+        say_no_tip(instrument, no_tip_text(instrument, wrists_[i]));
       }
       if (!instrument.tool) continue;
       const bool is_live = live_wrist_ && wrists_[i].none.empty();
@@ -416,12 +415,15 @@ class TrackRun {
     }
   }
 
+  static void say_no_tip(const Instrument& instrument, const std::string& why) {
+    if (!why.empty()) std::fprintf(stderr, "lapservo: %s: no tip: %s\n", instrument.name.c_str(), why.c_str());
+  }
+
   // Once behind the frames of a rig.
   void say_without_readings() const {
     for (std::size_t i = 0; i < wrists_.size(); ++i) {
       const Instrument& instrument = wrists_of_->instruments[i];
-      if (const std::string why = no_reading_text(instrument, wrists_[i], tip_frames_[i]); !why.empty())
-        std::fprintf(stderr, "lapservo: %s: no tip: %s\n", instrument.name.c_str(), why.c_str());
+      say_no_tip(instrument, no_reading_text(instrument, wrists_[i], tip_frames_[i]));
     }
   }
 

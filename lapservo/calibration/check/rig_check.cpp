@@ -292,10 +292,8 @@ class Advisor {
               (f_.work_space->lost ? fmt::format(", and in {} of {} places the marker is not found",
                                                  f_.work_space->lost, f_.work_space->places)
                                    : ""),
-          f_.lossy
-              ? "record without losses or at a higher bit rate; where that changes nothing, come nearer, more light, "
-                "a longer marker (lapservo marker design)"
-              : "come nearer, more light, a longer marker (lapservo marker design)",
+          std::string(f_.lossy ? "record without losses or at a higher bit rate; where that changes nothing, " : "") +
+              "come nearer, more light, a longer marker (lapservo marker design)",
           "psi where it is weakest");
   }
 

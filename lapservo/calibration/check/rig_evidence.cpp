@@ -5,6 +5,7 @@
 
 #include "lapservo/core/statistics.h"
 #include "lapservo/geometry/rotation.h"
+#include "lapservo/rig/instruments.h"
 
 namespace lapservo::internal {
 namespace {
@@ -15,12 +16,11 @@ constexpr double print_tolerance_m = 0.1e-3;
 // Without a registration that bends poses, and without what the rig says of errors that all frames share: as noise of
 // each frame they would hide what else is wrong. A tolerance of 0 is exact, a larger one at least the rig's.
 Rig free_rig(Rig rig, double tolerance_m, double focal_change) {
+  rig = without_sigmas(std::move(rig));
   for (Instrument& instrument : rig.instruments) {
     instrument.camera_from_rcm.reset();
     instrument.marker.tolerance_m = tolerance_m > 0 ? std::max(instrument.marker.tolerance_m, tolerance_m) : 0;
-    instrument.marker.sigmas = {};
   }
-  rig.camera.sigmas = {}, rig.camera.covariance.reset(), rig.camera.response.sigma.reset();
   rig.camera.fx_px *= 1 + focal_change, rig.camera.fy_px *= 1 + focal_change;
   return rig;
 }

@@ -10,6 +10,9 @@ namespace lapservo::internal {
 
 /// The parts of which image files consist, found without decoding them.
 
+/// Larger files are no images.
+inline constexpr std::size_t max_picture_bytes = std::size_t{256} << 20;
+
 inline std::string_view text_of(std::span<const std::uint8_t> bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }

@@ -90,20 +90,10 @@ ResidualLine line_of(std::span<const Measurement> measurements, std::size_t grou
 }
 
 // A root of the camera's covariance.
-RigErrors::CameraRoot root_of_covariance(const Camera& camera) {
-  RigErrors::CameraRoot root = RigErrors::CameraRoot::Zero();
-  if (camera.covariance) {
-    const Eigen::LDLT<RigErrors::CameraCovariance> parts(*camera.covariance);
-    const RigErrors::CameraCovariance lower = parts.matrixL();
-    root.leftCols<RigErrors::camera_numbers>() =
-        parts.transpositionsP().transpose() * (lower * parts.vectorD().cwiseMax(0).cwiseSqrt().asDiagonal());
-    return root;
-  }
-  const CameraSigmas& sigma = camera.sigmas;
-  root.diagonal() << std::sqrt(2.0 / 3) * sigma.fx_px, std::sqrt(2.0 / 3) * sigma.fy_px, sigma.cx_px, sigma.cy_px,
-      Eigen::Map<const Eigen::Matrix<double, 5, 1>>(sigma.distortion.data());
-  root.rightCols<1>().head<2>() << std::sqrt(1.0 / 3) * sigma.fx_px, std::sqrt(1.0 / 3) * sigma.fy_px;
-  return root;
+RigErrors::CameraCovariance root_of_covariance(const Camera& camera) {
+  const Eigen::LDLT<RigErrors::CameraCovariance> parts(camera.known_covariance());
+  const RigErrors::CameraCovariance lower = parts.matrixL();
+  return parts.transpositionsP().transpose() * (lower * parts.vectorD().cwiseMax(0).cwiseSqrt().asDiagonal());
 }
 
 }  // namespace

@@ -73,17 +73,15 @@ struct UsualErrors {
 inline constexpr UsualErrors usual_errors;
 
 /// How far one sigma of each number of the rig's camera, and of the marker's length, wrap, gap and diameter, moves
-/// measurements [px], to first order. A camera without a covariance has independent numbers, but for the two focal
-/// lengths, a third of whose variance is common: mostly they have all of it in common, but the rig does not say. The
-/// errors of a print's bands have most in common: they count as one of its length, beside what they leave of each
-/// boundary (Marker::boundary_sigma_m()). Images show lengths in diameters, and so a measured print is known: its
-/// lengths err with the diameter, beside their own sigmas. Those of another one are known in metres.
+/// measurements [px], to first order. The errors of a print's bands have most in common: they count as one of its
+/// length, beside what they leave of each boundary (Marker::boundary_sigma_m()). Images show lengths in diameters, and
+/// so a measured print is known: its lengths err with the diameter, beside their own sigmas. Those of another one are
+/// known in metres.
 class RigErrors {
  public:
   using CameraCovariance = decltype(Camera::covariance)::value_type;
-  static constexpr int camera_numbers = CameraCovariance::RowsAtCompileTime, of_camera = camera_numbers + 1,
-                       of_marker = 4, most = of_camera + 1 + of_marker;  ///< one of the response
-  using CameraRoot = Eigen::Matrix<double, camera_numbers, of_camera>;
+  static constexpr int camera_numbers = CameraCovariance::RowsAtCompileTime, of_marker = 4,
+                       most = camera_numbers + 1 + of_marker;  ///< one of the response
   using Shifts = Eigen::Matrix<double, most, 1>;
 
   /// `by_exponent_px`: how far a boundary moves with the exponent of the camera's response (moved_by_exponent_px()).
@@ -95,7 +93,7 @@ class RigErrors {
 
  private:
   const Camera* camera_;
-  CameraRoot camera_root_;  ///< of Camera::covariance
+  CameraCovariance camera_root_;  ///< of Camera::known_covariance()
   std::array<double, 4> response_px_{};
   /// How far length, wrap, gap and diameter move each boundary: at the print's upper edge, at its lower one.
   std::array<std::array<Eigen::Vector2d, 4>, of_marker> along_m_{};
