@@ -663,16 +663,19 @@ TEST_P(FirstWireLoop, StopsAndStartsAndTakesSetPointsAndTrajectoriesByTopic) {
 }
 
 TEST_P(WireLoop, ALoopThatHungNeedsAStart) {
+  const std::size_t on_its_way = GetParam() == "ros1";  // docs/known-issues.md: over ROS 1 one may be
   begin();
   ASSERT_TRUE(moves(500));
   for (const double hung_s : {0.7, 3.0}) {
     loop_->signal(SIGSTOP);
+    const double stopped_s = since_1970_s();
     sleep(hung_s);
     const std::size_t before = spy_->count(), said_before = said().size();
     loop_->signal(SIGCONT);
     expect_soon_said("loop_late", said_before);
     sleep(1);
-    EXPECT_EQ(spy_->count(), before);
+    EXPECT_LE(spy_->last_s(), stopped_s + tick_s);
+    EXPECT_LE(spy_->count(), before + on_its_way);
     ASSERT_TRUE(moves(300, [&] { start(); }));
   }
   end();
