@@ -58,18 +58,6 @@ struct Wrist {
   }
 };
 
-TEST(Tip, TestsWristIsTheToolsWrist) {
-  const Wrist wrist;
-  Tool tool = wrist.tool();
-  tool.place.emplace();
-  for (const double pitch : {-1.0, 0.0, 0.7})
-    for (const double yaw : {-0.6, 0.0, 1.1})
-      EXPECT_LT(
-          (tip_in_marker(tool, std::array{pitch, yaw}).marker_from_tip.translation - wrist.tip_in_base(pitch, yaw))
-              .norm(),
-          1e-12);
-}
-
 struct Errors {
   std::vector<Eigen::Vector3d> off_m, by_sigma;  // camera's axes
   int frames = 0;

@@ -43,40 +43,6 @@ TEST(Tracker, NamesTheInstrumentWhateverBecomesOfIt) {
   EXPECT_EQ(tracker.refuse(Status::damaged)[0].status, Status::damaged);
 }
 
-// Without readings of its wrist a tool has no tip, nor without a place; readings hold until others come.
-TEST(Tracker, KnowsTheTipWhereToolAndWristAreKnown) {
-  const auto& shot = usual_shot(1);
-  const auto tip_with = [&](const Tool& tool, const std::vector<double>& wrist_rad) {
-    Rig rig = shot.rig;
-    rig.instruments[0].tool = tool;
-    Tracker tracker(rig);
-    if (!wrist_rad.empty()) tracker.set_wrist(0, wrist_rad);
-    tracker.track(shot.bgr);
-    return tracker.track(shot.bgr)[0].tip;
-  };
-  Tool straight, wristed;
-  EXPECT_FALSE(tip_with(straight, {}));
-  straight.place.emplace().base_in_marker_m = {0, 0, 0.05};
-  wristed.wrist = {{.name = "wrist_pitch", .alpha_rad = -pi / 2}};
-  wristed.last_from_tip.translation = {0.01, 0, 0};
-  EXPECT_FALSE(tip_with(wristed, {0.1}));
-  wristed.place = straight.place;
-  EXPECT_FALSE(tip_with(wristed, {}));
-  const auto of_straight = tip_with(straight, {}), of_wristed = tip_with(wristed, {0.1});
-  ASSERT_TRUE(of_straight && of_wristed);
-  const Eigen::Vector3d truth =
-      camera_from_marker(shot.rig.instruments[0].marker,
-                         *shot.rig.instruments[0].camera_from_rcm * rcm_from_unrolled(shot.q), shot.q.psi_rad) *
-      Eigen::Vector3d(0, 0, 0.05);
-  EXPECT_LT((of_straight->camera_from_tip.translation - truth).norm(), 4 * of_straight->sigma_m());
-  EXPECT_EQ(of_straight->sigma_readings_m, 0);
-  EXPECT_NEAR((of_wristed->camera_from_tip.translation - of_straight->camera_from_tip.translation).norm(), 0.01, 1e-9);
-  EXPECT_NEAR(of_wristed->sigma_readings_m, 0.01 * pi / 180, 1e-9);
-  EXPECT_THROW(tip_with(wristed, {0.1, 0.2}), InputError);
-  EXPECT_THROW(tip_with(wristed, {std::nan("")}), InputError);
-  EXPECT_THROW(tip_with(straight, {0.1}), InputError);
-}
-
 // As if the rig had said so.
 TEST(Tracker, TakesAnotherRegistration) {
   const auto& shot = usual_shot(1);
