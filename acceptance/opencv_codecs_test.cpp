@@ -1,4 +1,4 @@
-// Compares images and videos with OpenCV's codecs, which share nothing with ours but libjpeg and libpng.
+// Compares images with OpenCV's codecs, which share nothing with ours but libjpeg and libpng.
 #include <cmath>
 #include <cstdint>
 #include <span>
@@ -7,13 +7,10 @@
 
 #include <gtest/gtest.h>
 #include <opencv2/imgcodecs.hpp>
-#include <opencv2/videoio.hpp>
 
 #include "lapservo/core/random.h"
 #include "lapservo/io/image_file.h"
-#include "lapservo/io/video/video_writer.h"
 #include "lapservo/testing/input_error.h"
-#include "lapservo/testing/temporary_folder.h"
 
 namespace lapservo::internal {
 namespace {
@@ -97,32 +94,6 @@ TEST(Decoding, OfWebPWithLossIsAsNearToTheOriginalAsOpenCvs) {
     EXPECT_LE(cv::norm(ours, original), 1.05 * cv::norm(opencvs, original)) << type;
     const cv::Scalar shift = cv::mean(ours) - cv::mean(opencvs);
     for (int c = 0; c < 3; ++c) EXPECT_NEAR(shift[c], 0, 0.2) << type << " " << c;
-  }
-}
-
-// Ours, read by OpenCV, shows what was written, in all that is smooth.
-TEST(OurVideo, IsReadByOpenCv) {
-  const testing::TemporaryFolder folder;
-  for (const std::string name : {"a.mp4", "a.mkv", "a.avi", "a.ts"}) {
-    VideoWriter writer(folder / name, 30);
-    std::vector<cv::Mat> written;
-    for (int i = 0; i < 5; ++i) {
-      written.emplace_back(240, 320, CV_8UC3, cv::Scalar(90, 120, 60));
-      written.back()(cv::Rect(40 * i, 50, 80, 80)).setTo(cv::Scalar(20, 40, 220));
-      writer.add(written.back());
-    }
-    writer.commit();
-    cv::VideoCapture reader((folder / name).string(), cv::CAP_FFMPEG);
-    ASSERT_TRUE(reader.isOpened()) << name;
-    EXPECT_NEAR(reader.get(cv::CAP_PROP_FPS), 30, 0.01) << name;
-    cv::Mat frame;
-    for (int i = 0; i < 5; ++i) {
-      ASSERT_TRUE(reader.read(frame)) << name << " " << i;
-      const cv::Rect inside(40 * i + 10, 60, 60, 60), outside(0, 150, 320, 80);
-      EXPECT_LE(cv::norm(frame(inside), written[static_cast<std::size_t>(i)](inside), cv::NORM_INF), 4) << name;
-      EXPECT_LE(cv::norm(frame(outside), written[static_cast<std::size_t>(i)](outside), cv::NORM_INF), 4) << name;
-    }
-    EXPECT_FALSE(reader.read(frame)) << name;
   }
 }
 
