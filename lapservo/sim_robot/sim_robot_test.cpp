@@ -25,8 +25,6 @@ class Room {
     subscriptions.push_back(transport.subscribe<OperatingStateMessage>(
         "/PSM1/operating_state",
         [this](OperatingStateMessage&& message) { interlock->on_operating_state(message, now_s); }));
-    subscriptions.push_back(transport.subscribe<ImageMessage>(
-        "/endoscope/image_raw", [this](ImageMessage&& message) { images.receive(std::move(message), now_s); }));
   }
   static SimulatorConfig simulated() {
     SimulatorConfig config;
@@ -48,7 +46,6 @@ class Room {
       }
       if (const auto sent = interlock->tick(now_s))
         transport.say("/PSM1/servo_jp", JointMessage{transport.stamp_s, interlock->names(), *sent});
-      taken += images.newest().has_value();
     }
   }
 
@@ -57,26 +54,10 @@ class Room {
   TestTransport transport;
   std::optional<Interlock> interlock;
   std::optional<SimRobot> robot;
-  ImageReceiver images{640, 360};
   JointPath path{JointLimits().acceleration};
   std::vector<Transport::Subscription> subscriptions;
   double now_s = 0;
-  int taken = 0;
 };
-
-TEST(SimRobot, IsMovedThroughItsTopicsAndShowsItself) {
-  Room room;
-  const Eigen::Vector4d start = room.simulator.measured_jp(), velocity(0.05, -0.05, 0.005, 0.1);
-  room.pass(1.1, velocity);
-  EXPECT_TRUE((room.simulator.measured_jp() - start).isApprox(velocity, 0.15));
-  EXPECT_NEAR(room.taken, 30, 3);
-  EXPECT_EQ(room.images.counts().text(), "");
-  const ServoStatistics statistics = room.robot->statistics();
-  EXPECT_GT(statistics.count, 900);
-  EXPECT_EQ(statistics.wrist_moved, 0);
-  EXPECT_EQ(statistics.malformed, 0);
-  EXPECT_TRUE((statistics.max_step.array() <= JointLimits().rate.array() * 0.002 + 1e-9).all());
-}
 
 TEST(SimRobot, OffersItsImagesCompressedToThoseWhoReadThem) {
   const std::string topic = "/endoscope/image_raw/compressed";
