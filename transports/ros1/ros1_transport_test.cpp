@@ -106,13 +106,6 @@ TEST_F(Ros1Wire, ALatchedMessageIsNewFromASenderThatIsNew) {
   EXPECT_EQ(latched.get([] {}).latched, Latched::perhaps);
 }
 
-TEST_F(Ros1Wire, ListsWhatOthersPublish) {
-  const auto say = transport_->publisher<JointMessage>("in/joints");
-  wait_for([&] { return transport_->published().contains("/out/state"); });
-  EXPECT_EQ(transport_->published().at("/out/state"), "crtk_msgs/OperatingState");
-  EXPECT_FALSE(transport_->published().contains("/in/joints")) << "its own";
-}
-
 TEST_F(Ros1Wire, KnowsWhoReads) {
   using Names = std::set<std::string>;
   const auto say = transport_->set_point_publisher("/in/joints"),
