@@ -321,18 +321,6 @@ def test_a_run_ends_when_told(rig):
     assert ticks[0].action == "hold" and ticks[0].hold_reason == "no_image_yet" and ticks[0].error is None
 
 
-def test_a_goal_that_can_not_be_reached_is_refused(rig):
-    bare = lapservo.Rig(rig.camera, [lapservo.Instrument("PSM1", rig.instruments[0].marker)])
-    uncalibrated = lapservo.Controller(bare, mode="uncalibrated")
-    for of, features, given in ((rig, [0, 0, 0, 0], {}), (rig, [3, 1e4, 1e4, 5e3], {}),
-                                (bare, [0, 0, 0, 0], {"controller": uncalibrated, "rcm_px": [100, 100]})):
-        simulator = lapservo.Simulator(rig, Q)
-        arm = Arm(simulator)
-        with pytest.raises(lapservo.InputError, match="trajectory: can't be followed at 0.00 s: [^\n]*$"):
-            lapservo.run(arm, simulator, simulator, of, lapservo.set_point(features), 1, **given)
-        assert arm.sent == 0 and np.array_equal(simulator.state().q, lapservo.Simulator(rig, Q).state().q)
-
-
 def test_the_uncalibrated_loop_goes_by_rcm_px_alone_and_no_other_takes_it(rig):
     simulator, seen = lapservo.Simulator(rig, Q), []
     uncalibrated = lapservo.Controller(rig, mode="uncalibrated")
