@@ -26,6 +26,7 @@
 #include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/rig/rig_writer.h"
 #include "lapservo/testing/environment.h"
+#include "lapservo/tool/test_tools.h"
 
 namespace lapservo::acceptance {
 using namespace internal;
@@ -44,9 +45,7 @@ Tool true_tool(std::uint64_t seed, const Marker& marker, bool with_wrist) {
   Random random(31 * seed);
   Tool tool;
   if (with_wrist) {
-    tool.wrist = {{.name = "wrist_pitch", .alpha_rad = -pi / 2, .theta_rad = -pi / 2},
-                  {.name = "wrist_yaw", .alpha_rad = -pi / 2, .a_m = 0.0091, .theta_rad = -pi / 2}};
-    tool.last_from_tip.translation = {0, 0.0102, 0};
+    tool = needle_driver();
     for (WristJoint& joint : tool.wrist) joint.offset_rad = joint.sigma_reading_rad * random.normal();
   }
   Tool::Place& place = tool.place.emplace();

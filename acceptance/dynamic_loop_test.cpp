@@ -294,12 +294,7 @@ DynamicLoop loop_of(const Tool& tool, std::uint64_t seed) {
   Random random(seed);
   DynamicLoop loop;
   loop.rig.instruments[0].tool = tool;
-  const auto direction = [&] {
-    return Eigen::Vector3d(random.normal(), random.normal(), random.normal()).normalized();
-  };
-  Rigid3& camera_from_rcm = *loop.true_rig.emplace(loop.rig).instruments[0].camera_from_rcm;
-  camera_from_rcm.translation += 1e-3 * direction();
-  camera_from_rcm.rotation = rotation_by(5e-3 * direction()) * camera_from_rcm.rotation;
+  loop.true_rig = misregistered(loop.rig, random);
   return loop;
 }
 

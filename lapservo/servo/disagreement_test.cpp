@@ -71,10 +71,6 @@ TEST(Disagreement, IsNotToldApartWhereTheDataDoNotTell) {
   EXPECT_EQ(explain_disagreement({}, instrument()).cause, Cause::unknown);
 }
 
-Eigen::Vector3d direction(Random& random) {
-  return Eigen::Vector3d(random.normal(), random.normal(), random.normal()).normalized();
-}
-
 // By a usable rig's errors at most, and beyond.
 World random_world(Cause cause, int joint, Random& random) {
   World world;
@@ -85,12 +81,12 @@ World random_world(Cause cause, int joint, Random& random) {
   if (cause == Cause::offset)
     world.offset[joint] = side * (joint == 2 ? random.uniform(0.02, 0.05) : random.uniform(0.4, 1.2));
   if (cause == Cause::registration)
-    world.rcm_from_true_rcm = {rotation_by(random.uniform(0, 0.4) * direction(random)),
-                               random.uniform(0.01, 0.03) * direction(random)};
+    world.rcm_from_true_rcm = {rotation_by(random.uniform(0, 0.4) * testing::random_direction(random)),
+                               random.uniform(0.01, 0.03) * testing::random_direction(random)};
   if (cause == Cause::moved) {
     world.moves_s = random.uniform(0.5, 0.9) * world.duration_s;
     world.moves_for_s = random.uniform(0, 1) < 0.5 ? 0 : random.uniform(0.1, 1);
-    world.moves_m = random.uniform(0.005, 0.02) * direction(random);
+    world.moves_m = random.uniform(0.005, 0.02) * testing::random_direction(random);
   }
   return world;
 }

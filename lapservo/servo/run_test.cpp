@@ -246,10 +246,6 @@ TEST(Run, IsNotSilentlyWrongWhereTheRigIs) {
 
 constexpr double endoscope_moves_s = 2.5;
 
-Eigen::Vector3d direction(Random& random) {
-  return Eigen::Vector3d(random.normal(), random.normal(), random.normal()).normalized();
-}
-
 // Whether the camera sees the marker and the shaft beside it, whose colour is needed too.
 bool shows(const Rig& rig, const Rigid3& camera_from_unrolled) {
   constexpr double beyond_m = 0.012, margin_px = 40;
@@ -268,8 +264,8 @@ EndoscopeMotion random_motion(const Rig& rig, double duration_s, MotionProfile p
   const auto q =
       newton_inverse(feature_model(rig), small_trajectory().at(endoscope_moves_s).features, start.vector(), {});
   while (true) {
-    const EndoscopeMotion motion{endoscope_moves_s, duration_s, translation_m * direction(random),
-                                 rotation_rad * direction(random), profile};
+    const EndoscopeMotion motion{endoscope_moves_s, duration_s, translation_m * testing::random_direction(random),
+                                 rotation_rad * testing::random_direction(random), profile};
     const Rigid3 moved =
         Rigid3{rotation_by(motion.rotation_rad), motion.translation_m}.inverse() * *rig.instruments[0].camera_from_rcm;
     if (!shows(rig, moved * rcm_from_unrolled(JointVector::from_vector(q->q)))) continue;
@@ -468,7 +464,8 @@ EndoscopeMotion reachable_motion(const Rig& rig, const ControllerConfig& config,
     return true;
   };
   while (true) {
-    const EndoscopeMotion motion{begin_s, 4, 0.02 * direction(random), 0.2 * direction(random), profile};
+    const EndoscopeMotion motion{begin_s, 4, 0.02 * testing::random_direction(random),
+                                 0.2 * testing::random_direction(random), profile};
     if (is_followed(motion)) return motion;
   }
 }

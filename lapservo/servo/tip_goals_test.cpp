@@ -9,7 +9,6 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/core/minimum_jerk.h"
 #include "lapservo/core/random.h"
-#include "lapservo/geometry/rotation.h"
 #include "lapservo/kinematics/tip_kinematics.h"
 #include "lapservo/servo/goal_check.h"
 #include "lapservo/servo/image_features.h"
@@ -68,17 +67,6 @@ struct Truth {
   }
 };
 
-Truth misregistered(const Rig& rig, Random& random) {
-  const auto direction = [&] {
-    return Eigen::Vector3d(random.normal(), random.normal(), random.normal()).normalized();
-  };
-  Truth truth{rig};
-  Rigid3& camera_from_rcm = *truth.rig.instruments[0].camera_from_rcm;
-  camera_from_rcm.translation += 1e-3 * direction();
-  camera_from_rcm.rotation = rotation_by(5e-3 * direction()) * camera_from_rcm.rotation;
-  return truth;
-}
-
 // Without any correction, and where registration and truth are one.
 TEST(TipGoals, FeaturesAreThoseOfTheConfigurationThatHoldsTheTipThere) {
   Random random(81);
@@ -130,7 +118,7 @@ TEST(TipGoals, TheImageClosesWhatTheRegistrationIsOffBy) {
     const Tool tool = trial % 2 ? straight_tool() : placed_tool();
     const Rig rig = rig_with(tool);
     const std::vector<double> wrist_rad(tool.wrist.size(), 0.4);
-    const Truth truth = misregistered(rig, random);
+    const Truth truth{testing::misregistered(rig, random)};
     TipGoals tips(rig, {});
     JointVector q = there;
     const TipGoal goal{truth.tip_at(q, wrist_rad) + 0.003 * Eigen::Vector3d(random.normal(), random.normal(), 0)};
@@ -344,10 +332,7 @@ TEST_F(Refusals, GoalsOutOfReachHaveTheNearestThatIsNot) {
 
 // Any azimuth is possible, as after a calliper.
 TEST_F(Refusals, ATipThatABentWristLeavesOpenIsNeitherAcceptedNorFollowed) {
-  Tool tool;
-  tool.wrist = {{.name = "wrist_pitch", .alpha_rad = -pi / 2, .theta_rad = -pi / 2},
-                {.name = "wrist_yaw", .alpha_rad = -pi / 2, .a_m = 0.0091, .theta_rad = -pi / 2}};
-  tool.last_from_tip.translation = {0, 0.0102, 0};
+  Tool tool = needle_driver();
   tool.place.emplace().base_in_marker_m = {0, 0, 0.04};
   tool.place->covariance(3, 3) = pi * pi / 3;
   rig.instruments[0].tool = tool;

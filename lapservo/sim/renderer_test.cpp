@@ -13,6 +13,7 @@
 #include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/sim/test_edge_probe.h"
 #include "lapservo/sim/tissue.h"
+#include "lapservo/tool/test_tools.h"
 
 namespace lapservo::internal {
 namespace {
@@ -174,10 +175,7 @@ TEST(Renderer, TheNearerShaftHidesTheFarther) {
 // dVRK's needle driver behind the shaft's end.
 ShaftModel shaft_with_tool() {
   ShaftModel model = short_shaft();
-  Tool& tool = model.tool.emplace();
-  tool.wrist = {{.name = "wrist_pitch", .alpha_rad = -pi / 2, .theta_rad = -pi / 2},
-                {.name = "wrist_yaw", .alpha_rad = -pi / 2, .a_m = 0.0091, .theta_rad = -pi / 2}};
-  tool.last_from_tip.translation = {0, 0.0102, 0};
+  Tool& tool = model.tool.emplace(needle_driver());
   Tool::Place& place = tool.place.emplace();
   place.base_in_marker_m = {0, 0, model.marker.length_m() + model.shaft_beyond_m};
   place.azimuth_rad = 0.4;

@@ -1,5 +1,7 @@
 #pragma once
 
+#include "lapservo/core/random.h"
+#include "lapservo/geometry/rotation.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/testing/sample_frames.h"
 
@@ -17,6 +19,18 @@ inline Rig small_test_rig() {
   camera.width_px /= 2, camera.height_px /= 2;
   camera.fx_px /= 2, camera.fy_px /= 2;
   camera.cx_px = (camera.width_px - 1) / 2.0, camera.cy_px = (camera.height_px - 1) / 2.0;
+  return rig;
+}
+
+inline Eigen::Vector3d random_direction(internal::Random& random) {
+  return Eigen::Vector3d(random.normal(), random.normal(), random.normal()).normalized();
+}
+
+/// The first instrument's registration off by 1 mm and 5 mrad.
+inline Rig misregistered(Rig rig, internal::Random& random) {
+  Rigid3& camera_from_rcm = *rig.instruments[0].camera_from_rcm;
+  camera_from_rcm.translation += 1e-3 * random_direction(random);
+  camera_from_rcm.rotation = internal::rotation_by(5e-3 * random_direction(random)) * camera_from_rcm.rotation;
   return rig;
 }
 

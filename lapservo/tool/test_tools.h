@@ -2,6 +2,7 @@
 
 #include <string_view>
 
+#include "lapservo/core/angles.h"
 #include "lapservo/tool/dvrk_tool_file.h"
 
 namespace lapservo::internal {
@@ -46,7 +47,16 @@ inline constexpr std::string_view invented_tool_json = R"(/* -*- Mode: Javascrip
 }
 )";
 
-/// That tool in a place, with standard deviations of it.
+/// Like dVRK's needle drivers, in no place: pitch and yaw, then a jaw of 10 mm.
+inline Tool needle_driver() {
+  Tool tool;
+  tool.wrist = {{.name = "wrist_pitch", .alpha_rad = -pi / 2, .theta_rad = -pi / 2},
+                {.name = "wrist_yaw", .alpha_rad = -pi / 2, .a_m = 0.0091, .theta_rad = -pi / 2}};
+  tool.last_from_tip.translation = {0, 0.0102, 0};
+  return tool;
+}
+
+/// The invented one in a place, with standard deviations of it.
 inline Tool placed_tool() {
   Tool tool = parse_dvrk_tool(invented_tool_json, "invented.json");
   tool.wrist[0].offset_rad = 0.02, tool.wrist[1].offset_rad = -0.03;

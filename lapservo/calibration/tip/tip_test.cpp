@@ -17,21 +17,13 @@
 #include "lapservo/geometry/rotation.h"
 #include "lapservo/robot/backlash.h"
 #include "lapservo/testing/has.h"
+#include "lapservo/tool/test_tools.h"
 
 namespace lapservo::internal {
 namespace {
 using testing::has;
 
 constexpr std::uint64_t first_seed = 1, last_seed = 20;
-
-// A wrist like dVRK's: pitch and yaw, then a jaw of 10 mm.
-Tool wristed() {
-  Tool tool;
-  tool.wrist = {{.name = "wrist_pitch", .alpha_rad = -pi / 2, .theta_rad = -pi / 2},
-                {.name = "wrist_yaw", .alpha_rad = -pi / 2, .a_m = 0.0091, .theta_rad = -pi / 2}};
-  tool.last_from_tip.translation = {0, 0.0102, 0};
-  return tool;
-}
 
 // Poses of a marker as a camera has them: errors that stay alike over a quarter of a second, and a part that all share.
 class Eye {
@@ -182,12 +174,12 @@ TEST(PivotedTip, IsPlacedAtTheReadingsOfItsWristAndRefusedWhereTheyMove) {
   std::vector<TipSighting> sightings;
   const Pivoted recording = pivoted(1, {});
   for (const TimedPose& pose : recording.poses) sightings.push_back({pose, bent_rad});
-  const TipCalibration found = pivoted_tip(wristed(), sightings);
+  const TipCalibration found = pivoted_tip(needle_driver(), sightings);
   ASSERT_EQ(found.refusal, "");
   EXPECT_LT((tip_in_marker(found.tool, bent_rad).marker_from_tip.translation - recording.tip_in_marker_m).norm(), 3e-4);
   sightings[7].wrist_rad[1] += 0.02;  // the sigma of a reading is 0.0175
-  EXPECT_TRUE(has(pivoted_tip(wristed(), sightings).refusal, "wrist_yaw is at -0.080 rad at 1.2 s"));
-  EXPECT_TRUE(has(pivoted_tip(wristed(), std::vector<TipSighting>()).refusal, "no frame"));
+  EXPECT_TRUE(has(pivoted_tip(needle_driver(), sightings).refusal, "wrist_yaw is at -0.080 rad at 1.2 s"));
+  EXPECT_TRUE(has(pivoted_tip(needle_driver(), std::vector<TipSighting>()).refusal, "no frame"));
 }
 
 struct Touched {
@@ -240,7 +232,7 @@ TEST(TouchedTip, IsFoundAsWellAsItsSigmaSays) {
 // The readings of the first touch are off: the others have the tip where it is, and the base behind it.
 TEST(TouchedTip, OfAWristThatIsBentAlikeIsPlacedAtTheMeanOfItsReadings) {
   for (std::uint64_t seed = first_seed; seed <= last_seed; ++seed) {
-    Touched recording = touched(seed, wristed(), 10, 0);
+    Touched recording = touched(seed, needle_driver(), 10, 0);
     recording.touches[0].wrist_rad = {-0.05, 0};
     const TipCalibration found = touched_tip(recording.truth, recording.touches, recording.names);
     ASSERT_EQ(found.refusal, "") << seed;
@@ -253,7 +245,7 @@ TEST(TouchedTip, OfAWristThatIsBentAlikeIsPlacedAtTheMeanOfItsReadings) {
 TEST(TouchedTip, CountsHowFarReadingsOfAWristThatIsBentAlikeMoveTheTip) {
   Errors tips;
   for (std::uint64_t seed = first_seed; seed <= last_seed; ++seed) {
-    const Touched recording = touched(seed, wristed(), 10, 0.04);
+    const Touched recording = touched(seed, needle_driver(), 10, 0.04);
     const TipCalibration found = touched_tip(recording.truth, recording.touches, recording.names);
     ASSERT_EQ(found.refusal, "") << seed;
     tips.add(found.tool.place->base_in_marker_m - recording.truth.place->base_in_marker_m,
@@ -266,7 +258,7 @@ TEST(TouchedTip, ShowsTheWristsOffsetsWhereItIsBent) {
   Errors tips;
   std::vector<double> offsets_deg, offset_sigmas;
   for (std::uint64_t seed = first_seed; seed <= last_seed; ++seed) {
-    const Touched recording = touched(seed, wristed(), 10, 0.8);
+    const Touched recording = touched(seed, needle_driver(), 10, 0.8);
     const TipCalibration found = touched_tip_of(recording);
     ASSERT_EQ(found.refusal, "") << seed;
     ASSERT_TRUE(found.with_offsets);
@@ -299,7 +291,7 @@ TEST(TouchedTip, IsRefusedWhereATouchIsOfAnotherCornerOrTheBoardMoves) {
 
 TEST(TouchedTip, IsRefusedWithALooseWrist) {
   for (const std::uint64_t seed : {1, 2}) {
-    Touched recording = touched(seed, wristed(), 10, 0.8);
+    Touched recording = touched(seed, needle_driver(), 10, 0.8);
     Random random(seed);
     for (TipSighting& touch : recording.touches)
       for (double& reading_rad : touch.wrist_rad) reading_rad += rad_from_deg(4) * random.normal();
@@ -311,7 +303,7 @@ TEST(TouchedTip, IsRefusedWithALooseWrist) {
 TEST(ToolPlace, KeepsTheMeasuredTip) {
   const Eigen::Vector3d tip_m(1e-4, -2e-4, 0.07);
   const Eigen::Matrix3d covariance_m2 = Eigen::Vector3d(1e-8, 2e-8, 4e-8).asDiagonal();
-  for (const Tool& tool : {Tool{}, wristed()}) {
+  for (const Tool& tool : {Tool{}, needle_driver()}) {
     const std::vector<double> wrist_rad(tool.wrist.size(), 0.1), bent_rad(tool.wrist.size(), 0.8);
     const Tool placed = placed_by_tip(tool, wrist_rad, tip_m, covariance_m2);
     const TipInMarker tip = tip_in_marker(placed, wrist_rad);
@@ -330,7 +322,7 @@ TEST(ToolPlace, ByCalliperIsAsKnownAsItsParts) {
   const Tool tool = placed_by_calliper({}, marker, 0.02, 1e-4);
   EXPECT_NEAR(tool.place->base_in_marker_m.z(), 0.045, 1e-12);
   EXPECT_NEAR(std::sqrt(tool.place->covariance(2, 2)), std::hypot(1e-4, 5e-5), 1e-12);
-  EXPECT_GT(placed_by_calliper(wristed(), marker, 0.02, 1e-4).place->covariance(3, 3), 1);
+  EXPECT_GT(placed_by_calliper(needle_driver(), marker, 0.02, 1e-4).place->covariance(3, 3), 1);
   marker.tolerance_m = 5e-4;  // of each end: larger
   EXPECT_NEAR(std::sqrt(placed_by_calliper({}, marker, 0.02, 1e-4).place->covariance(2, 2)),
               std::hypot(1e-4, 5e-4, 5e-4), 1e-12);
