@@ -170,8 +170,7 @@ py::dict calibrate_marker(const py::object& frames, const py::object& rig, const
   const std::size_t index = named_instrument(given.rig, instrument, given.name(), "instrument");
   const Instrument& before = given.rig.instruments[index];
   if (!joints.is_none()) expect_registration(before, given.name(), "joints");
-  std::optional<JointsOfTurn> turn;
-  if (auto read = joints_of(joints, before, given.name())) turn = {std::move(read->recording), read->source};
+  const std::optional<JointInput> turn = joints_of(joints, before, given.name());
   const GivenFrames source(frames, fps, &given.rig.camera, deinterlace);
   const JobWatch watch = watch_of(progress);
   const MarkerMeasurement measured = unlocked([&] {

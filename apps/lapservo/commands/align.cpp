@@ -1,18 +1,13 @@
 #include <cstdio>
-#include <optional>
 #include <string>
-#include <utility>
 
 #include <fmt/format.h>
 
-#include "apps/lapservo/cli/interrupt.h"
 #include "apps/lapservo/cli/subcommands.h"
 #include "apps/lapservo/commands/calibrate/calibrate_inputs.h"
-#include "apps/lapservo/inputs/frame_input.h"
 #include "apps/lapservo/inputs/joint_input.h"
 #include "lapservo/calibration/registration/alignment.h"
 #include "lapservo/calibration/registration/registration_measurement.h"
-#include "lapservo/core/atomic_file.h"
 #include "lapservo/core/error.h"
 #include "lapservo/core/rounded_sigma.h"
 #include "lapservo/core/statistics.h"
@@ -61,35 +56,27 @@ void write_page(const std::string& path, const std::string& input, const Alignme
 }
 
 int run(const CalibrateOptions& options) {
-  const RigAsRead read(options.rig);
-  Rig rig = load_rig(options.rig);
-  const std::size_t index = instrument_meant(rig, options.instrument, options.rig);
-  Instrument instrument = rig.instruments[index];
-  refuse_outputs_over_inputs(options, rig);
-  const auto frames = open_frames(options.input, options, &rig.camera);
-  const auto joints = find_joint_input(options, instrument, frames.get());
+  InstrumentJob job(options);
+  Instrument instrument = job.instrument();
+  const auto joints = find_joint_input(options, instrument, job.frames.get());
   if (!joints) throw InputError("--joints", "is missing, expected a CSV or a bag with the joints");
   instrument.joints = joints->joints;
-  std::optional<AtomicFile> out;
-  if (!options.out.empty()) out.emplace(options.out);
-  watch_for_interrupts();
-
-  const MeasuredPoses poses = poses_in_frames(rig, index, {*frames, options.input, options.deinterlace}, watched_job());
-  if (poses.read.stopped) return refuse(options.input, "stopped");
+  job.begin();
+  const MeasuredPoses poses = poses_in_frames(job.rig, job.index, job.recording(), watched_job());
   say_complaint(options.input, poses.read.complaint);
   if (!poses.none.empty()) return refuse(options.input, poses.none);
   const Alignment found = align(instrument, poses.all, joints->recording, joints->source);
   if (!found.refusal.empty()) return refuse(options.input, found.refusal);
   std::printf("%s\n%s\n", offset_text(found).c_str(), drift_text(found).c_str());
   if (!options.report.empty()) write_page(options.report, options.input, found, instrument.joints.value());
-  if (!out) {
+  if (!job.out) {
     std::printf("to apply it: write it into %s's entry in %s, or repeat this with --out %s\n", instrument.name.c_str(),
                 options.rig.c_str(), options.rig.c_str());
     return 0;
   }
-  rig.instruments[index].image_delay_s = found.delay_s;
-  rig.instruments[index].sigma_image_delay_s = rounded_sigma(found.sigma_delay_s);
-  return write_rig(*out, rig, options.out, read);
+  job.rig.instruments[job.index].image_delay_s = found.delay_s;
+  job.rig.instruments[job.index].sigma_image_delay_s = rounded_sigma(found.sigma_delay_s);
+  return job.write();
 }
 
 }  // namespace

@@ -12,12 +12,10 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "apps/lapservo/cli/interrupt.h"
 #include "apps/lapservo/cli/progress.h"
 #include "apps/lapservo/cli/subcommands.h"
 #include "apps/lapservo/commands/calibrate/calibrate_inputs.h"
 #include "apps/lapservo/commands/check_report.h"
-#include "apps/lapservo/inputs/frame_input.h"
 #include "apps/lapservo/inputs/joint_input.h"
 #include "lapservo/calibration/check/frame_diagnosis.h"
 #include "lapservo/calibration/check/rig_check.h"
@@ -73,22 +71,20 @@ std::string tip_text(const Instrument& instrument, const std::vector<FrameEviden
 }  // namespace
 
 int check(const CalibrateOptions& options) {
-  const Rig rig = load_rig(options.rig);
-  const std::size_t index = instrument_meant(rig, options.instrument, options.rig);
-  Instrument instrument = rig.instruments[index];
-  refuse_outputs_over_inputs(options, rig);
-  const auto source = open_frames(options.input, options, &rig.camera);
-  const auto joints = find_joint_input(options, instrument, source.get());
+  InstrumentJob job(options);
+  const Rig& rig = job.rig;
+  const std::size_t index = job.index;
+  Instrument instrument = job.instrument();
+  const auto joints = find_joint_input(options, instrument, job.frames.get());
   if (joints) instrument.joints = joints->joints;
-  watch_for_interrupts();
-
+  job.begin();
   constexpr int enough = 1800;
   RigEvidence evidence(rig, index);
   FrameDiagnosis diagnosis(rig, options.deinterlace);
   cv::Mat seen, missed;  // the last frames with and without the marker
   int count = 0;         // of those with it
-  const FramesRead read = read_frames({*source, options.input, options.deinterlace}, rig, every_of(*source, enough),
-                                      watched_job(), [&](const cv::Mat& bgr, double time_s) {
+  const FramesRead read = read_frames(job.recording(), rig, every_of(*job.frames, enough), watched_job(),
+                                      [&](const cv::Mat& bgr, double time_s) {
                                         const bool found = evidence.add(bgr, time_s);
                                         diagnosis.add(bgr, {});
                                         (found ? seen : missed) = bgr, count += found;
@@ -126,7 +122,7 @@ int check(const CalibrateOptions& options) {
   if (instrument.tool)
     checked.tip = tip_text(instrument, checked.frames,
                            find_wrist_input(options.input, options.joints, options.joint_topic, rig, index,
-                                            source.get(), &options.image_topic));
+                                            job.frames.get(), &options.image_topic));
   checked.exact_registration = exact_registration_text(instrument);
   std::printf("%s\n", instrument.name.c_str());
   print(checked);

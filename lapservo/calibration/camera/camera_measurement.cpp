@@ -102,7 +102,7 @@ void BoardRecordings::look_at(FrameSource& source, const std::string& name, cons
   }
   // A camera is stopped when there are enough views: that is how its calibration ends.
   if (live) read_.stopped = false;
-  read_.complaint = source.complaint();
+  read_.complaint = read_.stopped ? "" : source.complaint();
 }
 
 CameraMeasurement measure_camera(const Board& board, BoardRecordings recordings, const Camera& start,

@@ -51,7 +51,7 @@ double psi_of(const ShaftPose& pose, const Rigid3& camera_from_rcm) {
 }  // namespace
 
 MarkerMeasurement measure_marker(const Rig& rig, std::size_t index, const FrameRecording& recording,
-                                 const std::optional<JointsOfTurn>& joints, const JobWatch& watch) {
+                                 const std::optional<JointInput>& joints, const JobWatch& watch) {
   constexpr int enough = 400;  // frames of a video lie close together: more of them add no information
   const Instrument& instrument = rig.instruments[index];
   KeyFrames key_frames(rig, index);
@@ -59,9 +59,7 @@ MarkerMeasurement measure_marker(const Rig& rig, std::size_t index, const FrameR
   MarkerMeasurement measured;
   measured.read =
       read_frames(recording, rig, every_of(recording.source, enough), watch, [&](const cv::Mat& bgr, double time_s) {
-        const int before = key_frames.found();
-        key_frames.add(bgr, time_s);
-        if (key_frames.found() == before) diagnosis.add(bgr, {});
+        if (!key_frames.add(bgr, time_s)) diagnosis.add(bgr, {});
         return fmt::format(", {} in {}", instrument.name, key_frames.found());
       });
   measured.found = key_frames.found();

@@ -18,16 +18,10 @@ struct MarkerMeasurement {
   FramesRead read;
 };
 
-/// A further result with joints: the place of the seam.
-struct JointsOfTurn {
-  JointRecording recording;
-  std::string source;  ///< for complaints
-};
-
-/// Calibrates by some hundred frames of a rotation about the shaft's axis. Throws InputError as read_frames(), and
-/// naming the joints' source where they don't determine the seam.
+/// Calibrates by some hundred frames of a rotation about the shaft's axis; with joints the place of the seam, too.
+/// Throws InputError as read_frames(), and naming the joints' source where they don't determine the seam.
 MarkerMeasurement measure_marker(const Rig& rig, std::size_t instrument, const FrameRecording& recording,
-                                 const std::optional<JointsOfTurn>& joints, const JobWatch& watch);
+                                 const std::optional<JointInput>& joints, const JobWatch& watch);
 
 /// Throws InputError naming `rig` when the instrument lacks what the seam is measured through.
 void expect_registration(const Instrument& instrument, const std::string& rig, const std::string& joints_option);

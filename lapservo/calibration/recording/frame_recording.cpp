@@ -75,7 +75,7 @@ FramesRead read_frames(const FrameRecording& recording, const Rig& rig, int ever
   if (!frames.stopped && frames.all_damaged())
     throw InputError(recording.name, text_of_damaged(frames.damaged, frames.damaged));
   frames.lossy = source.is_lossy() || frames.jpegs > 0;
-  frames.complaint = source.complaint();
+  if (!frames.stopped) frames.complaint = source.complaint();
   return frames;
 }
 

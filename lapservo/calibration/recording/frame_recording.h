@@ -46,7 +46,7 @@ struct FramesRead {
   int jpegs = 0;          ///< of those looked at: what compressed them saw no frame before
   bool stopped = false;   ///< by the user, before its end; a camera has none
   bool lossy = false;     ///< FrameSource::is_lossy(), or JPEG
-  std::string complaint;  ///< what could not be read; empty when all was
+  std::string complaint;  ///< what could not be read; empty when all was, and when it was stopped
 
   bool all_damaged() const { return damaged > 0 && looked_at == 0; }
   /// " (3 are damaged)", or nothing.

@@ -65,7 +65,9 @@ MeasuredPoses poses_in_frames(const Rig& rig, std::size_t instrument, const Fram
                              if (seen.status == Status::ok && seen.marker) poses.all.push_back({time_s, *seen.marker});
                              return fmt::format(", {} in {}", name, poses.all.size());
                            });
-  if (poses.all.empty())
+  if (poses.read.stopped)
+    poses.none = "stopped";
+  else if (poses.all.empty())
     poses.none = fmt::format("{} is in none of {} frames{}{}", name, poses.read.looked_at,
                              poses.read.remark_on_damaged(), diagnosis.cause());
   return poses;

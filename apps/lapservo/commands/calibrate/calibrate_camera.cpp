@@ -46,7 +46,7 @@ void look_at(const std::string& input, const CalibrateCameraOptions& options, co
     throw InputError(input, "is a camera, whose Ctrl-C ends what comes after it, expected it as the last input");
   recordings.look_at(*source, input, watched_job(),
                      [](const std::string& wanted) { std::fprintf(stderr, "lapservo: %s\n", wanted.c_str()); });
-  if (!recordings.read().stopped) say_complaint(input, recordings.read().complaint);
+  say_complaint(input, recordings.read().complaint);
 }
 
 void print_result(const std::vector<BoardView>& views, const CameraCalibration& calibration) {

@@ -1,12 +1,10 @@
 #include <cstddef>
 #include <cstdio>
+#include <utility>
 
-#include "apps/lapservo/cli/interrupt.h"
 #include "apps/lapservo/cli/subcommands.h"
 #include "apps/lapservo/commands/calibrate/calibrate_inputs.h"
-#include "apps/lapservo/inputs/frame_input.h"
 #include "lapservo/calibration/colour/colour_calibration.h"
-#include "lapservo/core/atomic_file.h"
 
 namespace lapservo::app {
 using namespace internal;
@@ -25,22 +23,16 @@ void print(const Instrument& instrument, const ColourCalibration& calibration, s
 }  // namespace
 
 int calibrate_colour(const CalibrateOptions& options) {
-  const RigAsRead read(options.rig);
-  const Rig rig = load_rig(options.rig);
-  const std::size_t index = instrument_meant(rig, options.instrument, options.rig);
-  const Instrument& instrument = rig.instruments[index];
-  refuse_outputs_over_inputs(options, rig);
-  const auto source = open_frames(options.input, options, &rig.camera);
-  AtomicFile out(options.out);
-  watch_for_interrupts();
-
-  const ColourMeasurement measured = measure_colour(rig, index, {*source, options.input, options.deinterlace},
-                                                    options.replace_response, watched_job());
+  InstrumentJob job(options);
+  job.begin();
+  const ColourMeasurement measured =
+      measure_colour(job.rig, job.index, job.recording(), options.replace_response, watched_job());
   const ColourCalibration& calibration = measured.calibration;
-  if (!measured.read.stopped) say_complaint(options.input, measured.read.complaint);
-  if (!calibration.refusal.empty()) return refuse_calibration(options, calibration.refusal);
-  print(instrument, calibration, measured.frames);
-  return write_rig(out, with_colour(rig, index, calibration), options.out, read);
+  say_complaint(options.input, measured.read.complaint);
+  if (!calibration.refusal.empty()) return job.refuse(calibration.refusal);
+  print(job.instrument(), calibration, measured.frames);
+  job.rig = with_colour(std::move(job.rig), job.index, calibration);
+  return job.write();
 }
 
 void add_calibrate_colour(Command parent) {

@@ -54,19 +54,6 @@ std::size_t instrument_meant(const Rig& rig, const std::string& name, const std:
   return named_instrument(rig, name.empty() ? std::nullopt : std::optional(name), rig_file, "--instrument");
 }
 
-void refuse_outputs_over_inputs(const CalibrateOptions& options, const Rig& rig) {
-  InputFiles inputs;
-  for (const std::string& input : {options.input, options.joints}) inputs.add(input), inputs.add_pictures_in(input);
-  for (const std::string& out : {options.out, options.report, options.dvrk.base_frame}) inputs.refuse_as_output(out);
-  refuse_shared_place({options.out, options.report, options.dvrk.base_frame});
-  refuse_other_kind(options.out, ".yaml"), refuse_other_kind(options.report, ".html");
-  refuse_other_kind(options.dvrk.base_frame, ".json");
-  refuse_rig_over_part(options.out);
-  inputs.add_rig(options.rig, rig);
-  inputs.refuse_as_output(options.report);
-  inputs.refuse_as_output(options.dvrk.base_frame);
-}
-
 void say_complaint(const std::string& input, const std::string& complaint) {
   if (!complaint.empty())
     std::fprintf(stderr, "lapservo: %s: %s: what could be read is used\n", input.c_str(), complaint.c_str());
@@ -99,21 +86,44 @@ void RigAsRead::expect_unchanged(const std::string& out) const {
     throw InputError(out, "was changed while this ran, and is left as it is: repeat the command");
 }
 
-int write_rig(AtomicFile& out, const Rig& rig, const std::string& path, const RigAsRead& read) {
-  read.expect_unchanged(path);
-  out.stream() << measured_rig_yaml(rig, path);
-  out.commit();
-  std::printf("rig: %s\n", path.c_str());
-  return 0;
-}
-
 int refuse(const std::string& source, const std::string& why) {
   std::fprintf(stderr, "lapservo: %s: %s\n", source.c_str(), why.c_str());
   return 1;
 }
 
-int refuse_calibration(const CalibrateOptions& options, const std::string& why) {
-  return refuse(options.input, why + "; the rig is as it was");
+InstrumentJob::InstrumentJob(const CalibrateOptions& given, bool with_frames)
+    : options(given),
+      read(options.rig),
+      rig(load_rig(options.rig)),
+      index(instrument_meant(rig, options.instrument, options.rig)) {
+  InputFiles inputs;
+  for (const std::string& input : {options.input, options.joints}) inputs.add(input), inputs.add_pictures_in(input);
+  for (const std::string& place : {options.out, options.report, options.dvrk.base_frame})
+    inputs.refuse_as_output(place);
+  refuse_shared_place({options.out, options.report, options.dvrk.base_frame});
+  refuse_other_kind(options.out, ".yaml"), refuse_other_kind(options.report, ".html");
+  refuse_other_kind(options.dvrk.base_frame, ".json");
+  refuse_rig_over_part(options.out);
+  inputs.add_rig(options.rig, rig);
+  inputs.refuse_as_output(options.report), inputs.refuse_as_output(options.dvrk.base_frame);
+  if (with_frames) frames = open_frames(options.input, options, &rig.camera);
+}
+
+void InstrumentJob::begin() {
+  if (!options.out.empty()) out.emplace(options.out);
+  watch_for_interrupts();
+}
+
+int InstrumentJob::refuse(const std::string& why) const {
+  return app::refuse(options.input, why + "; the rig is as it was");
+}
+
+int InstrumentJob::write() {
+  read.expect_unchanged(options.out);
+  out.value().stream() << measured_rig_yaml(rig, options.out);
+  out->commit();
+  std::printf("rig: %s\n", options.out.c_str());
+  return 0;
 }
 
 }  // namespace lapservo::app

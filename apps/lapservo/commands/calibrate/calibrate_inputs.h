@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -46,10 +47,6 @@ void add_recording_options(Command command, CalibrateOptions& options);
 /// that is open or unknown.
 std::size_t instrument_meant(const Rig& rig, const std::string& name, const std::string& rig_file);
 
-/// Throws InputError when a result would go over an input or another result, a page over the rig, or
-/// the rig over its camera's or tools' files.
-void refuse_outputs_over_inputs(const CalibrateOptions& options, const Rig& rig);
-
 /// Prints on stderr the parts that a source could not read.
 void say_complaint(const std::string& input, const std::string& complaint);
 
@@ -70,14 +67,32 @@ class RigAsRead {
   std::string rig_, content_;
 };
 
-/// Writes the rig with what was measured, and says where it is; returns the exit code. Throws InputError as
-/// RigAsRead::expect_unchanged().
-int write_rig(internal::AtomicFile& out, const Rig& rig, const std::string& path, const RigAsRead& read);
-
 /// Says on stderr why there is no result; returns the exit code.
 int refuse(const std::string& source, const std::string& why);
-/// The same where the rig stays as it was.
-int refuse_calibration(const CalibrateOptions& options, const std::string& why);
+
+/// A subcommand that measures one instrument of a rig, from the frames of its input.
+struct InstrumentJob {
+  /// Throws InputError where it is open which instrument is meant, and when a result would go over an input or another
+  /// result, a page over the rig, or the rig over its camera's or tools' files. `with_frames`: opens the input.
+  explicit InstrumentJob(const CalibrateOptions& options, bool with_frames = true);
+  /// From now on Ctrl-C lets it end well. Throws InputError where --out can't be written.
+  void begin();
+  /// refuse(), where the rig stays as it was.
+  int refuse(const std::string& why) const;
+  /// Writes the rig with what was measured, and says where it is; returns the exit code. Throws InputError as
+  /// RigAsRead::expect_unchanged().
+  int write();
+
+  const Instrument& instrument() const { return rig.instruments[index]; }
+  internal::FrameRecording recording() const { return {*frames, options.input, options.deinterlace}; }
+
+  const CalibrateOptions& options;
+  RigAsRead read;
+  Rig rig;
+  std::size_t index;
+  std::unique_ptr<FrameSource> frames;
+  std::optional<internal::AtomicFile> out;
+};
 
 /// Options of `calibrate camera`.
 struct CalibrateCameraOptions : FrameOptions {

@@ -4,26 +4,14 @@
 #include <utility>
 #include <vector>
 
-#include "apps/lapservo/cli/interrupt.h"
 #include "apps/lapservo/cli/subcommands.h"
 #include "apps/lapservo/commands/calibrate/calibrate_inputs.h"
-#include "apps/lapservo/inputs/frame_input.h"
 #include "apps/lapservo/inputs/joint_input.h"
 #include "lapservo/calibration/marker/marker_measurement.h"
-#include "lapservo/core/atomic_file.h"
-#include "lapservo/io/frame_source.h"
 
 namespace lapservo::app {
 using namespace internal;
 namespace {
-
-// The joints are compared with these, which must be there before the work.
-std::optional<JointsOfTurn> joints_of_turn(const CalibrateOptions& options, const Instrument& instrument,
-                                           const FrameSource& frames) {
-  if (options.joints.empty()) return std::nullopt;
-  expect_registration(instrument, options.rig, "--joints");
-  return JointsOfTurn{find_joint_input(options, instrument, &frames).value().recording, options.joints};
-}
 
 void print_table(const std::vector<CalibratedNumber>& numbers) {
   std::printf("\n                               before        after      sigma     change\n");
@@ -50,21 +38,19 @@ void print_scale(const Marker& before, const Marker& after) {
 }  // namespace
 
 int calibrate_marker(const CalibrateOptions& options) {
-  const RigAsRead read(options.rig);
-  Rig rig = load_rig(options.rig);
-  const std::size_t index = instrument_meant(rig, options.instrument, options.rig);
-  const Instrument& instrument = rig.instruments[index];
-  refuse_outputs_over_inputs(options, rig);
-  const auto source = open_frames(options.input, options, &rig.camera);
-  const auto joints = joints_of_turn(options, instrument, *source);
-  AtomicFile out(options.out);
-  watch_for_interrupts();
-
-  const MarkerMeasurement measured =
-      measure_marker(rig, index, {*source, options.input, options.deinterlace}, joints, watched_job());
+  InstrumentJob job(options);
+  const Instrument& instrument = job.instrument();
+  std::optional<JointInput> joints;
+  if (!options.joints.empty()) {
+    expect_registration(instrument, options.rig, "--joints");
+    joints = find_joint_input(options, instrument, job.frames.get());
+    joints.value().source = options.joints;
+  }
+  job.begin();
+  const MarkerMeasurement measured = measure_marker(job.rig, job.index, job.recording(), joints, watched_job());
   const MarkerCalibration& calibration = measured.calibration;
-  if (!measured.read.stopped) say_complaint(options.input, measured.read.complaint);
-  if (!calibration.refusal.empty()) return refuse_calibration(options, calibration.refusal);
+  say_complaint(options.input, measured.read.complaint);
+  if (!calibration.refusal.empty()) return job.refuse(calibration.refusal);
   std::printf("%s: found in %d of %d frames; %zu from all sides are used, %zu of them show the seam\n",
               instrument.name.c_str(), measured.found, measured.read.looked_at, calibration.frames,
               calibration.seam_views);
@@ -81,8 +67,8 @@ int calibrate_marker(const CalibrateOptions& options) {
         "the images look compressed, and the turn does not go both ways: if they come from a video, which leaves the "
         "seam a little behind, psi is some mrad off; turn the instrument there and back\n");
   if (!joints) std::printf("seam_rad is the rig's: where the seam lies on the instrument takes --joints\n");
-  rig.instruments[index].marker = calibration.marker;
-  return write_rig(out, rig, options.out, read);
+  job.rig.instruments[job.index].marker = calibration.marker;
+  return job.write();
 }
 
 void add_calibrate_marker(Command parent) {

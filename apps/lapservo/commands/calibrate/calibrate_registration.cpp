@@ -11,7 +11,6 @@
 #include "apps/lapservo/cli/interrupt.h"
 #include "apps/lapservo/cli/subcommands.h"
 #include "apps/lapservo/commands/calibrate/calibrate_inputs.h"
-#include "apps/lapservo/inputs/frame_input.h"
 #include "apps/lapservo/inputs/joint_input.h"
 #include "apps/lapservo/inputs/live_images.h"
 #include "apps/lapservo/inputs/transports.h"
@@ -183,35 +182,27 @@ void print_reach(const Marker& marker, const Registration& registration) {
 }  // namespace
 
 int calibrate_registration(const CalibrateOptions& options) {
-  const RigAsRead read(options.rig);
-  Rig rig = load_rig(options.rig);
-  const std::size_t index = instrument_meant(rig, options.instrument, options.rig);
-  Instrument instrument = rig.instruments[index];
-  refuse_outputs_over_inputs(options, rig);
-  const auto frames = is_table(options.input) ? nullptr : open_frames(options.input, options, &rig.camera);
-  const auto joints = find_joint_input(options, instrument, frames.get());
+  InstrumentJob job(options, !is_table(options.input));
+  Instrument instrument = job.instrument();
+  const auto joints = find_joint_input(options, instrument, job.frames.get());
   if (joints) instrument.joints = joints->joints;
-  AtomicFile out(options.out);
-  watch_for_interrupts();
+  job.begin();
   DvrkOutput dvrk(options.dvrk, joints.has_value());
-
-  const MeasuredPoses poses =
-      frames ? poses_in_frames(rig, index, {*frames, options.input, options.deinterlace}, watched_job())
-             : poses_in_table(options.input, instrument.name);
-  if (poses.read.stopped) return refuse_calibration(options, "stopped");
+  const MeasuredPoses poses = job.frames ? poses_in_frames(job.rig, job.index, job.recording(), watched_job())
+                                         : poses_in_table(options.input, instrument.name);
   say_complaint(options.input, poses.read.complaint);
-  if (!poses.none.empty()) return refuse_calibration(options, poses.none);
+  if (!poses.none.empty()) return job.refuse(poses.none);
   const Registration registration = joints ? register_arm(instrument, poses.all, joints->recording, joints->source)
                                            : register_rcm(instrument, poses.all);
-  if (!registration.refusal.empty()) return refuse_calibration(options, registration.refusal);
+  if (!registration.refusal.empty()) return job.refuse(registration.refusal);
   print_numbers(instrument, registration);
   print_residuals(registration);
   print_reach(instrument.marker, registration);
   print_faults(registration.faults);
   for (const std::string& what : registration.unknown) std::printf("%s\n", what.c_str());
-  rig.instruments[index] = registered(rig.instruments[index], registration);
-  if (registration.arm) dvrk.find(rig.instruments[index], registration.arm->ranges, options.out);
-  write_rig(out, rig, options.out, read);
+  job.rig.instruments[job.index] = registered(job.instrument(), registration);
+  if (registration.arm) dvrk.find(job.instrument(), registration.arm->ranges, options.out);
+  job.write();
   dvrk.write(instrument.name);
   return 0;
 }

@@ -6,7 +6,6 @@
 
 #include <fmt/format.h>
 
-#include "apps/lapservo/cli/interrupt.h"
 #include "apps/lapservo/cli/subcommands.h"
 #include "apps/lapservo/commands/calibrate/calibrate_inputs.h"
 #include "apps/lapservo/inputs/frame_input.h"
@@ -16,7 +15,6 @@
 #include "lapservo/calibration/tip/tip_fit.h"
 #include "lapservo/calibration/tip/touch_measurement.h"
 #include "lapservo/core/angles.h"
-#include "lapservo/core/atomic_file.h"
 #include "lapservo/core/csv.h"
 #include "lapservo/core/error.h"
 #include "lapservo/core/rounded_covariance.h"
@@ -37,7 +35,7 @@ TipCalibration by_pivot(const CalibrateTipOptions& options, const Rig& rig, std:
   const WristInput wrist = find_wrist_input(options.input, "", options.joint_topic, rig, index, frames.get(), nullptr);
   const MeasuredPoses poses = poses_in_frames(rig, index, {*frames, options.input, options.deinterlace}, watched_job());
   TipCalibration refused;
-  refused.refusal = poses.read.stopped ? "stopped" : poses.none;
+  refused.refusal = poses.none;
   if (!refused.refusal.empty()) return refused;
   say_complaint(options.input, poses.read.complaint);
   if (tool.wrist.empty()) return pivoted_tip(tool, std::vector<double>(), poses.all);
@@ -112,21 +110,16 @@ int calibrate_tip(CalibrateTipOptions options, const Command& command) {
     command.refuse(frame_option_names(), "is of images, expected --pivot or --touch with it");
   if (options.pivot.empty()) command.refuse({"--joint-topic"}, "is of a bag, expected --pivot with it");
   options.input = options.pivot + options.touches;  // the one that is given
-  const RigAsRead read(options.rig);
-  Rig rig = load_rig(options.rig);
-  const std::size_t index = instrument_meant(rig, options.instrument, options.rig);
-  refuse_outputs_over_inputs(options, rig);
-  AtomicFile out(options.out);
-  watch_for_interrupts();
-
-  const Tool tool = rig.instruments[index].tool.value_or(Tool{});
+  InstrumentJob job(options, false);
+  job.begin();
+  const Tool tool = job.instrument().tool.value_or(Tool{});
   const auto way = !options.pivot.empty() ? by_pivot : !options.touches.empty() ? by_touch : by_calliper;
-  const TipCalibration calibration = way(options, rig, index, tool);
-  if (!calibration.refusal.empty()) return refuse_calibration(options, calibration.refusal);
+  const TipCalibration calibration = way(options, job.rig, job.index, tool);
+  if (!calibration.refusal.empty()) return job.refuse(calibration.refusal);
   print(calibration);
-  Tool& measured = rig.instruments[index].tool.emplace(calibration.tool);
+  Tool& measured = job.rig.instruments[job.index].tool.emplace(calibration.tool);
   measured.place->covariance = rounded_covariance(measured.place->covariance);
-  return write_rig(out, rig, options.out, read);
+  return job.write();
 }
 
 }  // namespace
