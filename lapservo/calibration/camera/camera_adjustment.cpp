@@ -204,6 +204,24 @@ bool add_covariance(ceres::Problem& problem, const CameraUnknowns& c, const Fitt
 
 }  // namespace
 
+std::array<CameraNumber, 11> numbers_of(Camera& camera) {
+  auto& [k1, k2, p1, p2, k3] = camera.distortion;
+  CameraSigmas& s = camera.sigmas;
+  auto& k = s.distortion;
+  ChromaticAberration& aberration = camera.chromatic_aberration;
+  return {{{"fx [px]", camera.fx_px, s.fx_px},
+           {"fy [px]", camera.fy_px, s.fy_px},
+           {"cx [px]", camera.cx_px, s.cx_px},
+           {"cy [px]", camera.cy_px, s.cy_px},
+           {"k1", k1, k[0]},
+           {"k2", k2, k[1]},
+           {"p1", p1, k[2]},
+           {"p2", p2, k[3]},
+           {"k3", k3, k[4]},
+           {"magnification of blue", aberration.blue, s.blue},
+           {"magnification of red", aberration.red, s.red}}};
+}
+
 std::optional<CameraAdjustment> adjust_camera(const Camera& start, const std::vector<Rigid3>& camera_from_board,
                                               const std::vector<std::vector<EdgePoint>>& views,
                                               const CameraFreedom& freedom, const AtIteration& at_iteration) {

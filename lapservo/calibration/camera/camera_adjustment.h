@@ -44,6 +44,13 @@ struct CameraAdjustment {
   std::vector<CameraFault> faults;                ///< that show, the clearest first: the sigmas count them
 };
 
+/// A number of a camera, and its standard deviation.
+struct CameraNumber {
+  const char* name;
+  double &value, &sigma;
+};
+std::array<CameraNumber, 11> numbers_of(Camera& camera);
+
 /// Fits a camera and the poses of a board in all views to the points of its edges (Ceres, Cauchy loss). Bright squares
 /// that look wider than dark ones, by as much all over a view, are allowed for. nullopt when it does not settle.
 std::optional<CameraAdjustment> adjust_camera(const Camera& start, const std::vector<Rigid3>& camera_from_board,

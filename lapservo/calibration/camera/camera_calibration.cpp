@@ -150,21 +150,6 @@ void add_residuals(const CameraAdjustment& adjustment, const MeasuredEdges& edge
   calibration.rms_px = rms(all);
 }
 
-// The same from the same images: what the last digits of sums are hangs on where in memory the numbers lie.
-Camera rounded_by_sigmas(Camera camera) {
-  const CameraSigmas& sigmas = camera.sigmas;
-  camera.fx_px = rounded_by_sigma(camera.fx_px, sigmas.fx_px);
-  camera.fy_px = rounded_by_sigma(camera.fy_px, sigmas.fy_px);
-  camera.cx_px = rounded_by_sigma(camera.cx_px, sigmas.cx_px);
-  camera.cy_px = rounded_by_sigma(camera.cy_px, sigmas.cy_px);
-  for (std::size_t i = 0; i < camera.distortion.size(); ++i)
-    camera.distortion[i] = rounded_by_sigma(camera.distortion[i], sigmas.distortion[i]);
-  ChromaticAberration& aberration = camera.chromatic_aberration;
-  aberration.blue = rounded_by_sigma(aberration.blue, sigmas.blue);
-  aberration.red = rounded_by_sigma(aberration.red, sigmas.red);
-  return camera;
-}
-
 // Describes the faults of one kind, and the remedy; `where`: in which views.
 std::string text_of(CameraFault::Kind kind, double size, const std::string& where) {
   switch (kind) {
@@ -261,7 +246,6 @@ std::array<std::array<bool, 4>, 3> parts_seen(const std::vector<BoardView>& view
 bool BoardViews::add(const std::string& name, const cv::Mat& bgr, bool always) {
   BoardView view{name, bgr, find_board(board_, bgr, always)};
   if (view.corners.size() < least_corners) return false;
-  ++found_;
   // The places of a few corners determine position, distance and tilt.
   constexpr double different = 0.06;  // of the image's width
   const auto distance_px = [&](const BoardView& other) {
@@ -302,9 +286,11 @@ std::string advice(const std::vector<BoardView>& views, const cv::Size& size) {
 }
 
 CameraCalibration calibrate_camera(const Board& board, const std::vector<BoardView>& views, const Camera& start,
-                                   const std::function<void(const std::string&)>& progress,
-                                   const AtIteration& at_iteration) {
+                                   const JobWatch& watch) {
   CameraCalibration calibration;
+  const AtIteration at_iteration = watch.is_stopped;
+  int step = 0;
+  const auto progress = [&](const char* what) { watch.tell(std::nullopt, ++step, fmt::format(", {}", what)); };
   const cv::Size size = views.empty() ? cv::Size() : views.front().bgr.size();
   const auto refuse = [&](const std::string& why) {
     const std::string more = advice(views, size);
@@ -346,7 +332,9 @@ CameraCalibration calibrate_camera(const Board& board, const std::vector<BoardVi
   const MeasuredEdges edges = measured(board, views, *fit, true, false);
   fit = adjust_what_shows(*fit, edges, at_iteration);
   if (!fit) return refuse("the views are too alike to determine the camera");
-  calibration.camera = rounded_by_sigmas(fit->camera);
+  calibration.camera = fit->camera;
+  // The same from the same images: what the last digits of sums are hangs on where in memory the numbers lie.
+  for (const CameraNumber& n : numbers_of(calibration.camera)) n.value = rounded_by_sigma(n.value, n.sigma);
   calibration.bright_wider_px = fit->bright_wider_px[green];
   add_residuals(*fit, edges, calibration);
   calibration.noise = fit->noise, calibration.faults = texts_of(fit->faults, views);

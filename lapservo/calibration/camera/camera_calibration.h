@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstddef>
-#include <functional>
 #include <optional>
 #include <string>
 #include <utility>
@@ -13,7 +12,7 @@
 #include "lapservo/calibration/camera/board.h"
 #include "lapservo/calibration/camera/camera_adjustment.h"
 #include "lapservo/calibration/camera/response_fit.h"
-#include "lapservo/calibration/fit/at_iteration.h"
+#include "lapservo/calibration/recording/frame_recording.h"
 #include "lapservo/geometry/camera.h"
 
 namespace lapservo::internal {
@@ -38,14 +37,12 @@ class BoardViews {
   const std::vector<BoardView>& views() const { return views_; }
   std::size_t most() const { return most_; }
   bool full() const { return views_.size() >= most_; }
-  int found() const { return found_; }
   std::vector<BoardView> take() { return std::move(views_); }
 
  private:
   Board board_;
   std::size_t most_;
   std::vector<BoardView> views_;
-  int found_ = 0;
 };
 
 /// Advice for the next images: "fill the lower left", "tilt the board". Empty when nothing is missing.
@@ -65,9 +62,8 @@ struct CameraCalibration {
 };
 
 /// Matrix, distortion, lateral chromatic aberration and response of the camera that took the views, all of one size.
-/// `start` gives the response to begin with. `progress` receives the finished steps.
-CameraCalibration calibrate_camera(
-    const Board& board, const std::vector<BoardView>& views, const Camera& start,
-    const std::function<void(const std::string&)>& progress = [](const auto&) {}, const AtIteration& at_iteration = {});
+/// `start` gives the response to begin with.
+CameraCalibration calibrate_camera(const Board& board, const std::vector<BoardView>& views, const Camera& start,
+                                   const JobWatch& watch = {});
 
 }  // namespace lapservo::internal

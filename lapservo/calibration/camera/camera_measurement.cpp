@@ -1,7 +1,6 @@
 #include "lapservo/calibration/camera/camera_measurement.h"
 
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <system_error>
 
@@ -120,37 +119,24 @@ CameraMeasurement measure_camera(const Board& board, BoardRecordings recordings,
                                              read.looked_at, read.remark_on_damaged());
     return measured;
   }
-  int step = 0;
-  const auto progress = [&](const std::string& what) { watch.tell(std::nullopt, ++step, ", " + what); };
-  measured.calibration = calibrate_camera(board, measured.views, start, progress, watch.is_stopped);
+  measured.calibration = calibrate_camera(board, measured.views, start, watch);
   measured.advice = advice(measured.views, *recordings.size());
   return measured;
 }
 
 Camera measured_camera(const CameraCalibration& calibration) {
   Camera camera = calibration.camera;
-  CameraSigmas& sigmas = camera.sigmas;
-  for (double* sigma : {&sigmas.fx_px, &sigmas.fy_px, &sigmas.cx_px, &sigmas.cy_px, &sigmas.blue, &sigmas.red})
-    *sigma = rounded_sigma(*sigma);
-  for (double& sigma : sigmas.distortion) sigma = rounded_sigma(sigma);
+  for (const CameraNumber& number : numbers_of(camera)) number.sigma = rounded_sigma(number.sigma);
   if (camera.covariance) camera.covariance = rounded_covariance(*camera.covariance);
   if (calibration.response) camera.response.sigma = rounded_sigma(calibration.response->sigma);
   return camera;
 }
 
 std::vector<CalibratedNumber> calibrated_numbers(const Camera& before, const CameraCalibration& calibration) {
-  const Camera& after = calibration.camera;
-  const CameraSigmas& sigmas = after.sigmas;
-  std::vector<CalibratedNumber> numbers{{"fx [px]", before.fx_px, after.fx_px, sigmas.fx_px},
-                                        {"fy [px]", before.fy_px, after.fy_px, sigmas.fy_px},
-                                        {"cx [px]", before.cx_px, after.cx_px, sigmas.cx_px},
-                                        {"cy [px]", before.cy_px, after.cy_px, sigmas.cy_px}};
-  constexpr std::array names{"k1", "k2", "p1", "p2", "k3"};
-  for (std::size_t i = 0; i < names.size(); ++i)
-    numbers.push_back({names[i], before.distortion[i], after.distortion[i], sigmas.distortion[i]});
-  const ChromaticAberration &was = before.chromatic_aberration, &is = after.chromatic_aberration;
-  numbers.push_back({"magnification of blue", was.blue, is.blue, sigmas.blue});
-  numbers.push_back({"magnification of red", was.red, is.red, sigmas.red});
+  Camera was = before, is = calibration.camera;
+  const auto from = numbers_of(was), to = numbers_of(is);
+  std::vector<CalibratedNumber> numbers;
+  for (std::size_t i = 0; i < to.size(); ++i) numbers.push_back({to[i].name, from[i].value, to[i].value, to[i].sigma});
   return numbers;
 }
 

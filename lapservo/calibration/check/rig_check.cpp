@@ -313,7 +313,6 @@ PrintCheck check_print(const Rig& rig, std::size_t instrument, std::vector<KeyFr
   check.psi_rad = psi_by_print(rig.instruments[instrument].marker, calibration.marker);
   if (!calibration.faults.empty() && check.psi_rad.sigma > rig_limits.print_rad)
     check.contradiction = calibration.faults.front();
-  check.measured = calibration.marker;
   check.residuals = std::move(calibration.before);
   return check;
 }

@@ -35,10 +35,9 @@ inline constexpr RigLimits rig_limits;
 /// The check of a print by a recording. Empty refusal: all of it is valid.
 struct PrintCheck {
   std::string refusal;
-  std::string contradiction;           ///< why the frames are not those of one print; empty where they are
-  double before_px = 0, after_px = 0;  ///< boundaries about the rig's print, and about the one that fits best
-  Told psi_rad;                        ///< rms over the turn of what the rig's print makes of psi
-  std::optional<Marker> measured;
+  std::string contradiction;             ///< why the frames are not those of one print; empty where they are
+  double before_px = 0, after_px = 0;    ///< boundaries about the rig's print, and about the one that fits best
+  Told psi_rad;                          ///< rms over the turn of what the rig's print makes of psi
   std::vector<PrintResidual> residuals;  ///< about the rig's print
 };
 PrintCheck check_print(const Rig& rig, std::size_t instrument, std::vector<KeyFrame> frames);

@@ -257,9 +257,10 @@ void SpreadFrames::add(const cv::Mat& bgr) {
 }
 
 ColourCalibration calibrate_colour(const Rig& rig, std::size_t instrument, const std::vector<cv::Mat>& frames,
-                                   bool keep_response, const std::function<void(const std::string&)>& progress,
-                                   bool lossy) {
+                                   bool keep_response, bool lossy, const JobWatch& watch) {
   ColourCalibration calibration;
+  int step = 0;
+  const auto progress = [&](const char* what) { watch.tell(std::nullopt, ++step, fmt::format(": {}", what)); };
   if (frames.size() < min_colour_frames)
     return calibration.refusal = fmt::format("{} frames, at least {} are needed", frames.size(), min_colour_frames),
            calibration;
@@ -346,10 +347,7 @@ ColourMeasurement measure_colour(const Rig& rig, std::size_t instrument, const F
   measured.frames = kept.frames().size();
   const bool is_named = recording.source.is_srgb();
   const bool keep_response = is_named || (!replace_response && rig.camera.response.sigma.has_value());
-  int step = 0;
-  measured.calibration = calibrate_colour(
-      rig, instrument, kept.frames(), keep_response,
-      [&](const std::string& what) { watch.tell(std::nullopt, ++step, ": " + what); }, measured.read.lossy);
+  measured.calibration = calibrate_colour(rig, instrument, kept.frames(), keep_response, measured.read.lossy, watch);
   if (is_named) measured.calibration.response_found = "as it is: the recording names how it encodes light";
   if (!measured.calibration.refusal.empty() &&
       2 * measured.calibration.found_before < static_cast<int>(measured.frames)) {

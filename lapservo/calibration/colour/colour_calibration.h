@@ -2,7 +2,6 @@
 
 #include <array>
 #include <cstddef>
-#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -39,9 +38,8 @@ struct ColourCalibration {
 /// (8-bit BGR of the rig's size). The rig's hues may be so wrong that it is not found at all: up to 60 degrees each.
 /// With keep_response the rig's stays, whatever the frames say: to a marker, sharpening looks like another response,
 /// and so does compression, which is named where the frames are `lossy`.
-ColourCalibration calibrate_colour(
-    const Rig& rig, std::size_t instrument, const std::vector<cv::Mat>& frames, bool keep_response = false,
-    const std::function<void(const std::string&)>& progress = [](const auto&) {}, bool lossy = false);
+ColourCalibration calibrate_colour(const Rig& rig, std::size_t instrument, const std::vector<cv::Mat>& frames,
+                                   bool keep_response = false, bool lossy = false, const JobWatch& watch = {});
 
 /// The frame in grey, with what is one of the rig's colours painted in its hue.
 cv::Mat segmentation_picture(const cv::Mat& bgr, const Rig& rig);

@@ -99,9 +99,7 @@ TEST_F(CalibrateColour, NamesAResponseThatIsNoUsualOne) {
   // A board measured the response: to measure it again leads back here. Compressed frames say nothing of the camera.
   real.camera.response = {Response::Kind::power, 1.4};
   for (const bool lossy : {false, true}) {
-    const std::string found = calibrate_colour(
-                                  rig, 0, filmed(real, {}), true, [](const auto&) {}, lossy)
-                                  .response_found;
+    const std::string found = calibrate_colour(rig, 0, filmed(real, {}), true, lossy).response_found;
     EXPECT_FALSE(has(found, "lapservo calibrate camera")) << found;
     EXPECT_EQ(has(found, "switch the camera's sharpening off"), !lossy) << found;
     EXPECT_EQ(has(found, "the recording is compressed"), lossy) << found;

@@ -67,11 +67,11 @@ bool tells_pose(const EdgeMeasurements& edges) {
 // The frames and the print while they are being fitted.
 class TurnFit {
  public:
-  TurnFit(const Rig& rig, std::size_t instrument, std::vector<KeyFrame> frames, const AtIteration& at_iteration)
+  TurnFit(const Rig& rig, std::size_t instrument, std::vector<KeyFrame> frames, AtIteration at_iteration)
       : measurer_(rig, instrument),
         marker_(rig.instruments[instrument].marker),
         frames_(std::move(frames)),
-        at_iteration_(at_iteration) {
+        at_iteration_(std::move(at_iteration)) {
     // Where it does not settle, a coarse pose is good enough to start from: the rounds look far.
     for (auto& [view, sighting, time_s, turned_rad] : frames_)
       if (!sighting.settled) sighting = measurer_.settled(view, marker_, sighting).value_or(sighting);
@@ -151,7 +151,7 @@ class TurnFit {
   ViewMeasurer measurer_;
   Marker marker_;
   std::vector<KeyFrame> frames_;
-  const AtIteration& at_iteration_;
+  AtIteration at_iteration_;
   std::vector<ViewMeasurements> measured_;
   bool free_gap_ = true, only_video_ = false;
 };
@@ -302,13 +302,13 @@ std::vector<KeyFrame> KeyFrames::take() {
 }
 
 MarkerCalibration calibrate_marker(const Rig& rig, std::size_t instrument, std::vector<KeyFrame> frames,
-                                   const std::function<void(int, int)>& progress, const AtIteration& at_iteration) {
+                                   const JobWatch& watch) {
   const Marker nominal = rig.instruments[instrument].marker;
   if (const std::string why = refusal_of(frames, nominal); !why.empty()) return refused(why);
   double first_s = frames.front().time_s;
   for (const KeyFrame& frame : frames) first_s = std::min(first_s, frame.time_s);
   const std::string unsolvable = "the frames contradict one another: is it one marker, and the rig's camera?";
-  TurnFit fit(rig, instrument, std::move(frames), at_iteration);
+  TurnFit fit(rig, instrument, std::move(frames), watch.is_stopped);
   MarkerCalibration calibration;
 
   // The rig's print first, to start the poses and to measure its residuals.
@@ -323,7 +323,7 @@ MarkerCalibration calibrate_marker(const Rig& rig, std::size_t instrument, std::
   bool settled = false, gap_judged = false;
   std::optional<double> no_gap_sigma_rad;
   for (int i = 0; i < max_rounds && !settled; ++i) {
-    if (progress) progress(i, max_rounds);
+    watch.tell(std::nullopt, i, fmt::format(" of at most {} rounds of fitting", max_rounds));
     const auto stage = std::min(static_cast<std::size_t>(i), rounds.size() - 1);
     last = fit.round(rounds[stage], true, stage + 1 == rounds.size());
     if (!last) return refused(unsolvable, true);

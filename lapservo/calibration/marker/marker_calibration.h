@@ -1,15 +1,14 @@
 #pragma once
 
 #include <cstddef>
-#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include <opencv2/core.hpp>
 
-#include "lapservo/calibration/fit/at_iteration.h"
 #include "lapservo/calibration/marker/marker_survey.h"
+#include "lapservo/calibration/recording/frame_recording.h"
 #include "lapservo/rig/rig.h"
 
 namespace lapservo::internal {
@@ -67,10 +66,8 @@ struct MarkerCalibration {
 };
 
 /// Bands, wrap, skew and gap of the rig's marker from frames of a full rotation. The diameter stays: images give
-/// lengths in diameters, since a smaller shaft nearer by looks the same. `progress` receives the rounds done and the
-/// most to come.
+/// lengths in diameters, since a smaller shaft nearer by looks the same.
 MarkerCalibration calibrate_marker(const Rig& rig, std::size_t instrument, std::vector<KeyFrame> frames,
-                                   const std::function<void(int, int)>& progress = {},
-                                   const AtIteration& at_iteration = {});
+                                   const JobWatch& watch = {});
 
 }  // namespace lapservo::internal

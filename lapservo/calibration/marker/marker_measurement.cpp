@@ -70,10 +70,7 @@ MarkerMeasurement measure_marker(const Rig& rig, std::size_t index, const FrameR
                     measured.read.looked_at, measured.read.remark_on_damaged(), diagnosis.cause());
     return measured;
   }
-  const auto progress = [&](int round, int most) {
-    watch.tell(std::nullopt, round, fmt::format(" of at most {} rounds of fitting", most));
-  };
-  measured.calibration = calibrate_marker(rig, index, key_frames.take(), progress, watch.is_stopped);
+  measured.calibration = calibrate_marker(rig, index, key_frames.take(), watch);
   if (!measured.calibration.refusal.empty() && 2 * measured.found < measured.read.looked_at && !watch.stopped())
     measured.calibration.refusal += diagnosis.cause();
   if (measured.read.jpegs == measured.read.looked_at) measured.calibration.seam_may_lag = false;
