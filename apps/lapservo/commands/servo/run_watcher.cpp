@@ -39,16 +39,18 @@ void say(double time_s, const std::string& what) {
 
 RunFolder::RunFolder(const ServoOptions& options, double duration_s, const Rig& rig, const ControllerConfig& controller,
                      const Rig* truth)
-    : folder_(options.out, rig, inputs_of(options, rig), options.force, needed_bytes(duration_s, controller)),
-      log_(folder_ / "log.csv") {
-  write_file(folder_ / "controller.yaml", controller_yaml(controller));
-  if (truth && rig_yaml(*truth) != rig_yaml(rig)) write_file(folder_ / "true_rig.yaml", rig_yaml(*truth));
+    : path_(options.out) {
+  if (path_.empty()) return;
+  folder_.emplace(path_, rig, inputs_of(options, rig), options.force, needed_bytes(duration_s, controller));
+  log_.emplace(*folder_ / "log.csv");
+  write_file(*folder_ / "controller.yaml", controller_yaml(controller));
+  if (truth && rig_yaml(*truth) != rig_yaml(rig)) write_file(*folder_ / "true_rig.yaml", rig_yaml(*truth));
 }
 
 void RunFolder::add(const ControlTick& tick, const std::optional<InstrumentTruth>& truth) {
-  if (failed_) return;
+  if (!log_ || failed_) return;
   try {
-    log_.add(tick.input, tick.decision, truth);
+    log_->add(tick.input, tick.decision, truth);
   } catch (const InputError& error) {
     failed_ = true;
     std::fprintf(stderr, "lapservo: %s: the run goes on without a log\n", error.what());
@@ -56,16 +58,11 @@ void RunFolder::add(const ControlTick& tick, const std::optional<InstrumentTruth
 }
 
 bool RunFolder::commit() {
-  if (failed_) return false;
-  log_.commit();
-  folder_.commit();
+  if (!folder_ || failed_) return !failed_;
+  log_->commit();
+  folder_->commit();
+  std::printf("log, rig and controller: %s\n", path_.c_str());
   return true;
-}
-
-std::unique_ptr<RunFolder> run_folder(const ServoOptions& options, double duration_s, const Rig& rig,
-                                      const ControllerConfig& controller, const Rig* truth) {
-  if (options.out.empty()) return nullptr;
-  return std::make_unique<RunFolder>(options, duration_s, rig, controller, truth);
 }
 
 bool RunWatcher::on_tick(const ControlTick& tick) {
@@ -73,7 +70,7 @@ bool RunWatcher::on_tick(const ControlTick& tick) {
   duration_s_ = tick.input.time_s - *start_s_;
   const std::optional<InstrumentTruth> true_now = truth();
   summary_.add(tick, true_now, arm_ ? block_of(*arm_) : "");
-  if (folder_) folder_->add(tick, true_now);
+  folder_.add(tick, true_now);
   const std::string before = std::exchange(state_, arm_ ? state_text(tick.decision, *arm_) : state_text(tick.decision));
   is_new_state_ = state_ != before;
   if (!follow(tick, duration_s_)) return false;
@@ -101,13 +98,6 @@ void RunWatcher::follow_goal(ChangingGoal& goal, const ControlTick& tick, double
   if (!said) return;
   say(time_s, *said);
   if (page_) page_->answer(time_s, *said);
-}
-
-bool RunWatcher::commit_log() {
-  if (!folder_) return true;
-  if (!folder_->commit()) return false;
-  std::printf("log, rig and controller: %s\n", options_.out.c_str());
-  return true;
 }
 
 }  // namespace lapservo::app

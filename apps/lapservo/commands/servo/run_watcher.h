@@ -1,9 +1,7 @@
 #pragma once
 
-#include <memory>
 #include <optional>
 #include <string>
-#include <utility>
 
 #include "apps/lapservo/cli/output_folder.h"
 #include "apps/lapservo/commands/servo/changing_goal.h"
@@ -17,7 +15,7 @@ namespace lapservo::app {
 
 /// A line of a run's, at once.
 void say(double time_s, const std::string& what);
-/// A run's log.csv, rig.yaml and controller.yaml.
+/// A run's log.csv, rig.yaml and controller.yaml by --out; none without it.
 class RunFolder {
  public:
   /// With the whole rig, whatever the method forgets of it: the frames can be tracked with it too. `truth`: the
@@ -26,32 +24,27 @@ class RunFolder {
             const Rig* truth = nullptr);
   /// A failure to write is reported once, and never ends the run.
   void add(const ControlTick& tick, const std::optional<InstrumentTruth>& truth);
-  /// False where something could not be written.
+  /// Keeps them and reports where; false where something could not be written.
   bool commit();
 
  private:
-  OutputFolder folder_;
-  ServoLog log_;
+  const std::string path_;
+  std::optional<OutputFolder> folder_;
+  std::optional<ServoLog> log_;
   bool failed_ = false;
 };
-
-/// By --out; none without it.
-std::unique_ptr<RunFolder> run_folder(const ServoOptions& options, double duration_s, const Rig& rig,
-                                      const ControllerConfig& controller, const Rig* truth = nullptr);
 
 /// The user's view of a run: its log, its page and its last lines. A kind of run adds its own by follow().
 class RunWatcher : public RunObserver {
  public:
   /// `arm`: none in a recording. `page`: where there is one.
-  RunWatcher(const ServoOptions& options, std::unique_ptr<RunFolder> folder, Supervisor* arm, ServoPage* page)
-      : options_(options), folder_(std::move(folder)), arm_(arm), page_(page) {}
+  RunWatcher(const ServoOptions& options, RunFolder& folder, Supervisor* arm, ServoPage* page)
+      : options_(options), folder_(folder), arm_(arm), page_(page) {}
 
   bool on_tick(const ControlTick& tick) final;
   const internal::RunSummary& summary() const { return summary_; }
   /// Since the first tick.
   double duration_s() const { return duration_s_; }
-  /// Keeps the log and reports where; false where something could not be written.
-  bool commit_log();
 
  protected:
   /// `time_s`: since the first tick. False ends the run.
@@ -68,7 +61,7 @@ class RunWatcher : public RunObserver {
  private:
   bool ends_by_page(const ControlTick& tick, double time_s);
 
-  std::unique_ptr<RunFolder> folder_;
+  RunFolder& folder_;
   Supervisor* arm_;
   ServoPage* page_;
   internal::RunSummary summary_;

@@ -1,12 +1,9 @@
-#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
-#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
-#include <vector>
 
 #include <fmt/format.h>
 
@@ -69,9 +66,9 @@ JointVector joints_at_start(const ServoOptions& options, const Trajectory& traje
 
 class SimulationWatcher : public RunWatcher {
  public:
-  SimulationWatcher(const ServoOptions& options, std::unique_ptr<RunFolder> folder, Supervisor& arm, ServoPage* page,
+  SimulationWatcher(const ServoOptions& options, RunFolder& folder, Supervisor& arm, ServoPage* page,
                     FeatureModel true_model, const Simulator& simulator, ChangingGoal& goal, int ticks)
-      : RunWatcher(options, std::move(folder), &arm, page),
+      : RunWatcher(options, folder, &arm, page),
         true_model_(std::move(true_model)),
         simulator_(simulator),
         goal_(goal),
@@ -110,18 +107,18 @@ int simulate(const ServoOptions& options) {
   if (options.web.port) page.emplace(options, config.rig, "servo, simulated", true);
   Supervisor arm(simulator, simulator);
   if (options.page_says_operator_present()) arm.watch_operator([&] { return page->operator_present(); });
-  auto folder = run_folder(options, options.duration_s(), believed_rig, config.controller, &true_rig);
+  RunFolder folder(options, options.duration_s(), believed_rig, config.controller, &true_rig);
   watch_for_interrupts();
 
   ChangingGoal goal(trajectory, config);
-  SimulationWatcher watcher(options, std::move(folder), arm, page ? &*page : nullptr, true_model, simulator, goal,
+  SimulationWatcher watcher(options, folder, arm, page ? &*page : nullptr, true_model, simulator, goal,
                             static_cast<int>(std::lround(options.duration_s() / config.controller.period_s)));
   lapservo::run(arm, simulator, simulator, config, goal.trajectory(), options.duration_s(), watcher);
   watcher.end_progress();
   std::printf("method %s, seen by %s\n%s\n", std::string(to_string(config.controller.mode)).c_str(),
               config.tracker.method == Method::centerline ? "the paper's Algorithm 1" : "all visible lines",
               watcher.summary().text().c_str());
-  return watcher.commit_log() && watcher.summary().succeeded(options.strict) ? 0 : 1;
+  return folder.commit() && watcher.summary().succeeded(options.strict) ? 0 : 1;
 }
 
 int replay_log(const ServoOptions& options, const Command& command) {

@@ -1,7 +1,6 @@
 #include <cstdio>
 #include <functional>
 #include <map>
-#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -46,10 +45,10 @@ std::string name_in_use(const Rig& rig) {
 // Every change is reported once, in one line.
 class ArmWatcher : public RunWatcher {
  public:
-  ArmWatcher(const ServoOptions& options, std::unique_ptr<RunFolder> folder, Supervisor& arm, ServoPage* page,
-             const RunConfig& run, const CrtkRobot& robot, const ArmPose* endoscope, LiveImages& images,
-             LoopTopics& topics, ChangingGoal& goal)
-      : RunWatcher(options, std::move(folder), &arm, page),
+  ArmWatcher(const ServoOptions& options, RunFolder& folder, Supervisor& arm, ServoPage* page, const RunConfig& run,
+             const CrtkRobot& robot, const ArmPose* endoscope, LiveImages& images, LoopTopics& topics,
+             ChangingGoal& goal)
+      : RunWatcher(options, folder, &arm, page),
         run_(run),
         arm_(arm),
         robot_(robot),
@@ -216,17 +215,17 @@ int steer_arm(const ServoOptions& options) {
   }
   if (const std::string not_granted = robot.not_granted(); options.enable_motion && !not_granted.empty())
     std::printf("setpoints leave without %s, see docs/ros.md\n", not_granted.c_str());
-  auto folder = run_folder(options, options.duration_s(), rig, controller_of(config));
+  RunFolder folder(options, options.duration_s(), rig, controller_of(config));
 
   ChangingGoal goal(trajectory, config);
-  ArmWatcher watcher(options, std::move(folder), arm, its_page, config, robot,
-                     endoscope_arm ? &*endoscope_arm : nullptr, images, topics, goal);
+  ArmWatcher watcher(options, folder, arm, its_page, config, robot, endoscope_arm ? &*endoscope_arm : nullptr, images,
+                     topics, goal);
   if (ended_by_page()) return end_by_page();
   request_real_time(loop_priority);  // the robot has said what is not granted
   lapservo::run(arm, images, clock, config, goal.trajectory(), options.duration_s(), watcher);
   say_counts(robot.counts(), images.counts());
   std::printf("%s\n", watcher.summary().text().c_str());
-  return watcher.commit_log() && watcher.summary().succeeded(options.strict) ? 0 : 1;
+  return folder.commit() && watcher.summary().succeeded(options.strict) ? 0 : 1;
 }
 
 }  // namespace lapservo::app

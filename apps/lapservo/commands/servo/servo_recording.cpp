@@ -21,10 +21,8 @@ namespace {
 
 class RecordingWatcher : public RunWatcher {
  public:
-  RecordingWatcher(const ServoOptions& options, std::unique_ptr<RunFolder> folder, const ReplayedRun& recorded)
-      : RunWatcher(options, std::move(folder), nullptr, nullptr),
-        recorded_(recorded),
-        progress_(recorded.image_count()) {}
+  RecordingWatcher(const ServoOptions& options, RunFolder& folder, const ReplayedRun& recorded)
+      : RunWatcher(options, folder, nullptr, nullptr), recorded_(recorded), progress_(recorded.image_count()) {}
   bool acted() const { return acted_; }
 
  private:
@@ -70,18 +68,17 @@ int decide_on_recording(const ServoOptions& options) {
     std::printf("the arm's clock is %.2f s %s the camera's, by when both were recorded\n", std::abs(lead_s),
                 lead_s > 0 ? "ahead of" : "behind");
   const double asked_s = std::min(options.duration.value_or(recorded.duration_s()), recorded.duration_s());
-  auto folder = run_folder(options, asked_s, rig, config.controller);
+  RunFolder folder(options, asked_s, rig, config.controller);
   watch_for_interrupts();
 
-  RecordingWatcher watcher(options, std::move(folder), recorded);
+  RecordingWatcher watcher(options, folder, recorded);
   lapservo::run(recorded, recorded, recorded, config, trajectory, asked_s, watcher);
   std::printf("decided on %.1f s of a recording, %d images and the joints; nothing was sent%s\n", watcher.duration_s(),
               recorded.images_given(), watcher.summary().holds_text().c_str());
   say_remark(options.replay, recorded.complaint());
   say_remark(options.replay, recorded.joint_remark());
-  return watcher.commit_log() && watcher.acted() && !(options.strict && watcher.summary().registration_contradicted())
-             ? 0
-             : 1;
+  return folder.commit() && watcher.acted() && !(options.strict && watcher.summary().registration_contradicted()) ? 0
+                                                                                                                  : 1;
 }
 
 }  // namespace lapservo::app
