@@ -328,22 +328,21 @@ void print(const CheckedRig& checked) {
 }
 
 // Medians over the frames, the largest part first.
-std::string tip_text(const Instrument& instrument, const std::vector<FrameEvidence>& frames, const WristInput& wrist) {
+std::string tip_text(const Instrument& instrument, const std::vector<FrameEvidence>& frames, WristInput wrist) {
   std::vector<double> whole_mm;
   std::array<std::pair<std::vector<double>, const char*>, 3> parts{
       {{{}, "the shaft"}, {{}, "the marker's place"}, {{}, "the wrist's joints"}}};
-  TipFrames tip_frames;
   for (const FrameEvidence& frame : frames) {
     Observation seen;
     seen.status = frame.status, seen.marker = frame.marker;
     const auto tip = seen.tip = tip_of(seen, *instrument.tool, wrist_at(wrist, instrument, frame.time_s));
-    tip_frames.add(seen, frame.time_s);
+    wrist.add(seen, frame.time_s);
     if (!tip) continue;
     whole_mm.push_back(1e3 * tip->sigma_m());
     parts[0].first.push_back(1e3 * tip->sigma_shaft_m), parts[1].first.push_back(1e3 * tip->sigma_place_m);
     parts[2].first.push_back(1e3 * tip->sigma_readings_m);
   }
-  const std::string why = no_tip_text(instrument, wrist) + no_reading_text(instrument, wrist, tip_frames);
+  const std::string why = no_tip_text(instrument, wrist) + no_reading_text(instrument, wrist);
   if (whole_mm.empty()) return "unknown: " + (why.empty() ? "no frame has the marker and readings" : why);
   std::vector<std::pair<double, const char*>> sizes_mm;
   for (auto& [all_mm, from] : parts)
@@ -406,9 +405,7 @@ int check(const CalibrateOptions& options) {
   }
   checked.advice = advice_on(checked.findings);
   if (instrument.tool)
-    checked.tip = tip_text(instrument, checked.frames,
-                           find_wrist_input(options.input, options.joints, options.joint_topic, rig, index,
-                                            job.frames.get(), &options.image_topic));
+    checked.tip = tip_text(instrument, checked.frames, find_wrist_input(options, rig, index, *job.frames, true));
   checked.exact_registration = exact_registration_text(instrument);
   std::printf("%s\n", instrument.name.c_str());
   print(checked);

@@ -48,9 +48,8 @@ using namespace internal;
 namespace {
 namespace fs = std::filesystem;
 
-struct TrackOptions : FrameOptions {
-  std::string input, rig, out = "obs.csv", overlay;
-  std::string method = "surface", publish, tf_frames = default_frames, joints, joint_topic;
+struct TrackOptions : RecordingOptions {
+  std::string out = "obs.csv", overlay, method = "surface", publish, tf_frames = default_frames;
   bool single = false;
   WebOptions web;
   bool page_only = false;  ///< `lapservo view`: at the input's own pace, and without --out
@@ -375,7 +374,7 @@ class TrackRun {
         const auto& observations =
             frame->flaw ? tracker.refuse(*frame->flaw) : tracker.track(frame->bgr, frame->time_s);
         tally_.add(observations);
-        for (std::size_t i = 0; i < observations.size(); ++i) tip_frames_[i].add(observations[i], frame->time_s);
+        for (std::size_t i = 0; i < observations.size(); ++i) wrists_[i].add(observations[i], frame->time_s);
         if (const auto frames_ago = registration_.add(observations)) say_moved(options_, *frame, *frames_ago);
         lossy_ |= has_jpeg_extension(frame->file);
         diagnosis().add(frame->bgr, observations);
@@ -398,14 +397,13 @@ class TrackRun {
     if (is_new) {
       say_without_readings();
       wrists_of_ = rigs_.rig();
-      wrists_.clear(), tip_frames_.assign(instruments.size(), {});
+      wrists_.clear();
     }
     for (std::size_t i = 0; i < instruments.size(); ++i) {
       const Instrument& instrument = instruments[i];
       if (is_new) {
         wrists_.push_back(live_wrist_ ? WristInput{std::nullopt, other_wrist_text(options_.joints, *rigs_.rig(), i)}
-                                      : find_wrist_input(options_.input, options_.joints, options_.joint_topic,
-                                                         *rigs_.rig(), i, &source_, &options_.image_topic));
+                                      : find_wrist_input(options_, *rigs_.rig(), i, source_, true));
         say_no_tip(instrument, no_tip_text(instrument, wrists_[i]));
       }
       if (!instrument.tool) continue;
@@ -423,7 +421,7 @@ class TrackRun {
   void say_without_readings() const {
     for (std::size_t i = 0; i < wrists_.size(); ++i) {
       const Instrument& instrument = wrists_of_->instruments[i];
-      say_no_tip(instrument, no_reading_text(instrument, wrists_[i], tip_frames_[i]));
+      say_no_tip(instrument, no_reading_text(instrument, wrists_[i]));
     }
   }
 
@@ -483,8 +481,7 @@ class TrackRun {
   std::optional<OverlayWriter> overlay_;
   std::optional<LiveWrist> live_wrist_;
   std::shared_ptr<const Rig> wrists_of_;
-  std::vector<WristInput> wrists_;     // an instrument, by that rig
-  std::vector<TipFrames> tip_frames_;  // likewise
+  std::vector<WristInput> wrists_;  // an instrument, by that rig
   SteadyClock clock_;
   double begin_s_ = 0;
   Tally tally_;
@@ -497,7 +494,7 @@ class TrackRun {
 
 // Options that would be ignored.
 void refuse_idle(const TrackOptions& options, const Command& command) {
-  refuse_idle_joint_topic(options.input, options.joints, options.joint_topic);
+  refuse_idle_joint_topic(options);
   if (!names_topic(options.input)) return;
   std::vector<std::string> of_recordings = frame_option_names();
   std::erase(of_recordings, "--deinterlace");

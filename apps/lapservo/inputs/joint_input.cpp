@@ -1,13 +1,11 @@
 #include "apps/lapservo/inputs/joint_input.h"
 
 #include <algorithm>
-#include <cstddef>
-#include <vector>
+#include <memory>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "apps/lapservo/inputs/frame_input.h"
 #include "lapservo/core/csv.h"
 #include "lapservo/core/error.h"
 #include "lapservo/crtk/joint_map.h"
@@ -27,26 +25,35 @@ std::vector<std::string> columns_of(const std::string& path) {
   return names;
 }
 
-// Reports on stderr what is passed over.
-JointInput reported(JointInput input) {
-  say_remark(input.source, input.recording.remark());
-  return input;
-}
+// Joints as they were recorded: in a bag, else in a table.
+struct RecordedJoints {
+  std::string source{};  // empty: nowhere
+  std::shared_ptr<const Bag> bag{};
+  const BagTopic* topic = nullptr;
 
-JointInput read_table(const CalibrateOptions& options, const Instrument& instrument) {
-  const Joints joints =
-      joints_of(instrument, instrument.joints ? std::vector<std::string>() : columns_of(options.joints), options.joints,
-                options.rig);
-  return reported({joints, read_joint_recording(options.joints, joints), options.joints});
-}
-
-JointInput read_topic(const CalibrateOptions& options, const Instrument& instrument, const FrameSource* frames,
-                      const Bag& bag, const BagTopic& topic) {
-  const auto begin_s = frames ? frames->first_stamp_s() : std::nullopt;
-  const std::string source = bag.path() + ": " + topic.name;
-  const Joints joints = joints_of(instrument, joint_names_in_bag(bag, topic), source, options.rig);
-  return reported({joints, joints_in_bag(bag, topic, joints, begin_s), source});
-}
+  RecordedJoints(const RecordingOptions& options, const Instrument& instrument) : source(options.joints) {
+    const std::string path = bag_of(options.joints.empty() ? options.input : options.joints);
+    if (path.empty()) return;
+    bag = open_bag(path);
+    if (path != options.input) say_remark(path, bag->remark());
+    topic = joint_topic_of(*bag, options.joint_topic, instrument.name);
+    if (topic) source = path + ": " + topic->name;
+  }
+  std::vector<std::string> names() const {
+    if (topic) return joint_names_in_bag(*bag, *topic);
+    return bag || source.empty() ? std::vector<std::string>() : columns_of(source);
+  }
+  // Reports on stderr what is passed over.
+  JointInput read(const Joints& joints, const FrameSource* frames, JointsOf whose) const {
+    const auto begin_s = frames ? frames->first_stamp_s() : std::nullopt;
+    JointInput input{
+        joints,
+        topic ? joints_in_bag(*bag, *topic, joints, begin_s, whose) : read_joint_recording(source, joints, whose),
+        source};
+    say_remark(source, input.recording.remark());
+    return input;
+  }
+};
 
 // A wrist's joints by the names that they are recorded with, repeated up to four.
 std::optional<Joints> wrist_joints(const Tool& tool, const std::vector<std::string>& recorded) {
@@ -82,35 +89,23 @@ bool share_a_joint(const std::optional<Tool>& a, const std::optional<Tool>& b) {
 
 }  // namespace
 
-WristInput find_wrist_input(const std::string& input, const std::string& joints, const std::string& joint_topic,
-                            const Rig& rig, std::size_t index, const FrameSource* frames,
-                            const std::string* image_topic) {
+WristInput find_wrist_input(const RecordingOptions& options, const Rig& rig, std::size_t index,
+                            const FrameSource& frames, bool counts) {
   const Instrument& instrument = rig.instruments[index];
   if (!instrument.tool || instrument.tool->wrist.empty()) return {};
-  const std::string path = bag_of(joints.empty() ? input : joints);
-  const auto bag = path.empty() ? nullptr : open_bag(path);
-  if (bag && path != input) say_remark(path, bag->remark());
-  const BagTopic* topic = bag ? joint_topic_of(*bag, joint_topic, instrument.name) : nullptr;
-  std::vector<std::string> names;
-  if (topic) names = joint_names_in_bag(*bag, *topic);
-  if (!bag && !joints.empty()) names = columns_of(joints);
-  const auto found = wrist_joints(*instrument.tool, names);
+  const RecordedJoints recorded(options, instrument);
+  const auto found = wrist_joints(*instrument.tool, recorded.names());
   if (!found)
     return {std::nullopt, fmt::format("no readings of the wrist's joints {}: --joints names a recording or topic that "
                                       "has them",
                                       fmt::join(wrist_names(instrument.tool), ", "))};
-  const std::string source = topic ? path + ": " + topic->name : joints;
+  const auto& [source, bag, topic] = recorded;
   if (const std::string why = other_wrist_text(source, rig, index); !why.empty()) return {std::nullopt, why};
-  const auto begin_s = frames ? frames->first_stamp_s() : std::nullopt;
-  WristInput wrist{reported({*found,
-                             topic ? joints_in_bag(*bag, *topic, *found, begin_s, JointsOf::wrist)
-                                   : read_joint_recording(joints, *found, JointsOf::wrist),
-                             source}),
-                   ""};
-  if (image_topic && topic && path == bag_of(input))
-    wrist.none =
-        foreign_delay_text(instrument, *bag, *topic, path == input ? &image_topic_of(*bag, *image_topic) : nullptr);
-  else if (image_topic && instrument.image_delay_s)
+  WristInput wrist{recorded.read(*found, &frames, JointsOf::wrist), ""};
+  if (counts && topic && bag->path() == bag_of(options.input))
+    wrist.none = foreign_delay_text(
+        instrument, *bag, *topic, bag->path() == options.input ? &image_topic_of(*bag, options.image_topic) : nullptr);
+  else if (counts && instrument.image_delay_s)
     say_remark(source, fmt::format("{}'s tip counts the rig's image_delay_s of {:.3f} s, expected that of these two "
                                    "recordings: lapservo align measures it",
                                    instrument.name, *instrument.image_delay_s));
@@ -148,23 +143,23 @@ std::string no_tip_text(const Instrument& instrument, const WristInput& wrist) {
   return wrist.none;
 }
 
-void TipFrames::add(const Observation& observation, double time_s) {
+void WristInput::add(const Observation& observation, double time_s) {
   if (!observation.marker) return;
   if (!first_s) first_s = time_s;
   last_s = time_s, has_tip |= observation.tip.has_value();
 }
 
-std::string no_reading_text(const Instrument& instrument, const WristInput& wrist, const TipFrames& frames) {
-  if (!wrist.readings || !no_tip_text(instrument, wrist).empty() || !frames.first_s || frames.has_tip) return "";
+std::string no_reading_text(const Instrument& instrument, const WristInput& wrist) {
+  if (!wrist.readings || !no_tip_text(instrument, wrist).empty() || !wrist.first_s || wrist.has_tip) return "";
   const std::vector<double>& times_s = wrist.readings->recording.time_s;
   const double delay_s = instrument.image_delay_s.value_or(0);
   return fmt::format(
       "{} has no readings around the frames with the marker: they run from {:.2f} to {:.2f} s by its clock, it from "
       "{:.2f} to {:.2f} s: subtract what time_s has more, or correct the rig's image_delay_s",
-      wrist.readings->source, *frames.first_s - delay_s, frames.last_s - delay_s, times_s.front(), times_s.back());
+      wrist.readings->source, *wrist.first_s - delay_s, wrist.last_s - delay_s, times_s.front(), times_s.back());
 }
 
-void add_joint_options(Command command, CalibrateOptions& options, const std::string& help) {
+void add_joint_options(Command command, RecordingOptions& options, const std::string& help) {
   command.add_option("--joints", options.joints, help);
   add_joint_topic_option(command, options.joint_topic);
 }
@@ -175,25 +170,22 @@ void add_joint_topic_option(Command command, std::string& joint_topic) {
                      "or the only measured_js");
 }
 
-void refuse_idle_joint_topic(const std::string& input, const std::string& joints, const std::string& joint_topic) {
-  const std::string& source = joints.empty() ? input : joints;
-  if (bag_of(source).empty()) refuse_topic_outside_bags("--joint-topic", joint_topic, source);
+void refuse_idle_joint_topic(const RecordingOptions& options) {
+  const std::string& source = options.joints.empty() ? options.input : options.joints;
+  if (bag_of(source).empty()) refuse_topic_outside_bags("--joint-topic", options.joint_topic, source);
 }
 
-std::optional<JointInput> find_joint_input(const CalibrateOptions& options, const Instrument& instrument,
+std::optional<JointInput> find_joint_input(const RecordingOptions& options, const Instrument& instrument,
                                            const FrameSource* frames) {
-  refuse_idle_joint_topic(options.input, options.joints, options.joint_topic);
-  const bool are_named = !options.joints.empty();
-  const std::string path = bag_of(are_named ? options.joints : options.input);
-  if (path.empty() && are_named) return read_table(options, instrument);
-  if (path.empty()) return std::nullopt;
-  const auto bag = open_bag(path);
-  if (path != options.input) say_remark(path, bag->remark());
-  const BagTopic* topic = joint_topic_of(*bag, options.joint_topic, instrument.name);
-  if (!topic && are_named)
+  refuse_idle_joint_topic(options);
+  const RecordedJoints recorded(options, instrument);
+  if (recorded.source.empty()) return std::nullopt;
+  if (recorded.bag && !recorded.topic)
     throw InputError(options.joints, std::string("has no messages of ") + joint_type + ", expected the joints'");
-  if (!topic) return std::nullopt;
-  return read_topic(options, instrument, frames, *bag, *topic);
+  const bool are_known = !recorded.topic && instrument.joints;  // a pipe is read once
+  const Joints joints =
+      joints_of(instrument, are_known ? std::vector<std::string>() : recorded.names(), recorded.source, options.rig);
+  return recorded.read(joints, frames, JointsOf::arm);
 }
 
 }  // namespace lapservo::app

@@ -9,7 +9,6 @@
 
 #include "apps/lapservo/cli/interrupt.h"
 #include "apps/lapservo/cli/progress.h"
-#include "apps/lapservo/inputs/frame_input.h"
 #include "apps/lapservo/inputs/input_files.h"
 #include "lapservo/core/error.h"
 #include "lapservo/rig/calibration_record.h"

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "apps/lapservo/cli/subcommands.h"
-#include "apps/lapservo/inputs/frame_input.h"
+#include "apps/lapservo/inputs/joint_input.h"
 #include "lapservo/calibration/camera/camera_measurement.h"
 #include "lapservo/calibration/recording/frame_recording.h"
 #include "lapservo/core/atomic_file.h"
@@ -21,8 +21,8 @@ struct DvrkOptions {
 };
 
 /// Options of the subcommands that measure one instrument of a rig from frames.
-struct CalibrateOptions : FrameOptions {
-  std::string input, rig, out, instrument, joints, report, joint_topic;
+struct CalibrateOptions : RecordingOptions {
+  std::string out, instrument, report;
   bool replace_response = false;  ///< of colour only
   DvrkOptions dvrk;               ///< of registration only
 };

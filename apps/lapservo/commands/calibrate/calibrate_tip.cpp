@@ -32,7 +32,7 @@ struct CalibrateTipOptions : CalibrateOptions {
 TipCalibration by_pivot(const CalibrateTipOptions& options, const Rig& rig, std::size_t index, const Tool& tool) {
   const auto frames = open_frames(options.input, options, &rig.camera);
   // A wrist has to stand still: whatever the delay, its readings are the same.
-  const WristInput wrist = find_wrist_input(options.input, "", options.joint_topic, rig, index, frames.get(), nullptr);
+  const WristInput wrist = find_wrist_input(options, rig, index, *frames, false);
   const MeasuredPoses poses = poses_in_frames(rig, index, {*frames, options.input, options.deinterlace}, watched_job());
   TipCalibration refused;
   refused.refusal = poses.none;

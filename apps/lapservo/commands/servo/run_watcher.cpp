@@ -25,8 +25,8 @@ InputFiles inputs_of(const ServoOptions& options, const Rig& rig) {
   inputs.add(options.controller);
   inputs.add(options.trajectory);
   inputs.add(options.joint_limits);
-  inputs.add(options.replay);
-  if (!options.replay.empty()) inputs.add_pictures_in(options.replay);
+  inputs.add(options.recorded.input);
+  if (!options.recorded.input.empty()) inputs.add_pictures_in(options.recorded.input);
   return inputs;
 }
 

@@ -125,7 +125,7 @@ int replay_log(const ServoOptions& options, const Command& command) {
   for (const std::string& name : command.given())
     if (name != "--replay")
       throw InputError(name, "is given, expected none with a log: rig.yaml and controller.yaml beside it count");
-  const fs::path log = options.replay, folder = log.parent_path();
+  const fs::path log = options.recorded.input, folder = log.parent_path();
   const std::string rig_file = (folder / "rig.yaml").string();
   Rig rig = first_instrument(load_rig(rig_file), rig_file);
   const ControllerConfig controller = load_controller(folder / "controller.yaml", {});
@@ -148,7 +148,8 @@ int replay_log(const ServoOptions& options, const Command& command) {
 void check_operator_present(const ServoOptions& options) {
   const std::string& source = options.operator_present;
   if (source.empty()) return;
-  if (!options.replay.empty()) throw InputError("--operator-present", "is for runs, expected none with --replay");
+  if (!options.recorded.input.empty())
+    throw InputError("--operator-present", "is for runs, expected none with --replay");
   if (options.page_says_operator_present() && !options.web.port)
     throw InputError("--operator-present", "is page and there is no page, expected --web with it");
   if (options.robot == "sim" && !options.page_says_operator_present())
@@ -157,7 +158,7 @@ void check_operator_present(const ServoOptions& options) {
 
 // Options that would be ignored.
 void refuse_idle(const ServoOptions& options, const Command& command) {
-  const bool recorded = !options.replay.empty(), simulated = options.robot == "sim";
+  const bool recorded = !options.recorded.input.empty(), simulated = options.robot == "sim";
   if (!recorded)
     command.refuse({"--image-topic", "--joint-topic", "--eye", "--side-by-side"},
                    "is of a recording, expected --replay with it");
@@ -175,10 +176,10 @@ void refuse_idle(const ServoOptions& options, const Command& command) {
 int run(const ServoOptions& options, const Command& command) {
   options.web.check();
   check_operator_present(options);
-  const bool recorded = !bag_of(options.replay).empty();
-  if (!options.replay.empty() && options.web.port)
+  const bool recorded = !bag_of(options.recorded.input).empty();
+  if (!options.recorded.input.empty() && options.web.port)
     throw InputError("--web", "is for runs, expected none with --replay");
-  if (!options.replay.empty() && !recorded) return replay_log(options, command);
+  if (!options.recorded.input.empty() && !recorded) return replay_log(options, command);
   if (options.rig.empty())
     throw InputError("--rig", "is missing, expected a rig's YAML, for example configs/paper.yaml");
   refuse_idle(options, command);
@@ -259,13 +260,13 @@ void add_result_options(Command command, ServoOptions& options) {
 }
 
 void add_replay_options(Command command, ServoOptions& options) {
-  command.add_option("--replay", options.replay,
+  command.add_option("--replay", options.recorded.input,
                      "A run's log.csv: decide everything again and compare every bit; a bag of ROS 1 or 2, or a "
                      "session of dvrk_data: decide on "
                      "the recorded images and joints as without --enable-motion");
   add_image_topic_option(command, options.recorded.image_topic);
   add_eye_options(command, options.recorded);
-  add_joint_topic_option(command, options.joint_topic);
+  add_joint_topic_option(command, options.recorded.joint_topic);
 }
 
 void add_simulator_options(Command command, ServoOptions& options) {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "apps/lapservo/cli/web_view.h"
-#include "apps/lapservo/inputs/frame_input.h"
+#include "apps/lapservo/inputs/joint_input.h"
 #include "apps/lapservo/inputs/transports.h"
 #include "lapservo/control/trajectory.h"
 #include "lapservo/servo/run.h"
@@ -16,9 +16,9 @@ namespace lapservo::app {
 
 /// Options of `lapservo servo`.
 struct ServoOptions {
-  std::string rig, robot, instrument, camera, joint_limits,
-      trajectory = "paper", method = "default", tracker, controller, delay = "estimate", out, replay, joint_topic,
-      control = "both", operator_present, endoscope, frames = default_frames;
+  std::string rig, robot, instrument, camera, joint_limits, trajectory = "paper", method = "default", tracker,
+                                                            controller, delay = "estimate", out, control = "both",
+                                                            operator_present, endoscope, frames = default_frames;
   std::vector<double> set_point, tip, via, start, rcm_px, hide;
   std::vector<double> registration_error;  // 3 x mm
   double latency_ms = 80;
@@ -28,7 +28,7 @@ struct ServoOptions {
   int setpoint_readers = 1;
   bool force = false, enable_motion = false, strict = false;
   WebOptions web;
-  FrameOptions recorded;  // how the images of `replay` are read
+  RecordingOptions recorded;  // its input: of --replay
 
   /// Else a topic does, or nobody has to.
   bool page_says_operator_present() const { return operator_present == "page"; }

@@ -49,20 +49,20 @@ int decide_on_recording(const ServoOptions& options) {
   if (config.controller.mode == ControlMode::uncalibrated) forget_registration(config, options);
   const Trajectory trajectory = trajectory_of(options);
 
-  const std::string path = bag_of(options.replay);
+  const std::string path = bag_of(options.recorded.input);
   const auto bag = open_bag(path);
   const BagTopic* images = nullptr;  // a session's images have the times of the recorder
-  if (path == options.replay) {
+  if (path == options.recorded.input) {
     images = &image_topic_of(*bag, options.recorded.image_topic);
   } else {
     say_remark(path, bag->remark());
   }
   const Instrument& instrument = arm_of(options, rig);
-  auto frames = open_frames(options.replay, options.recorded, &rig.camera);
-  auto wrist = find_wrist_input(options.replay, "", options.joint_topic, rig, 0, frames.get(), nullptr);
+  auto frames = open_frames(options.recorded.input, options.recorded, &rig.camera);
+  auto wrist = find_wrist_input(options.recorded, rig, 0, *frames, false);
   if (const std::string why = no_tip_text(instrument, wrist); !why.empty())
-    say_remark(options.replay, "no tip: " + why);
-  ReplayedRun recorded(std::move(frames), *bag, images, options.joint_topic, instrument,
+    say_remark(options.recorded.input, "no tip: " + why);
+  ReplayedRun recorded(std::move(frames), *bag, images, options.recorded.joint_topic, instrument,
                        wrist.readings ? std::optional(std::move(wrist.readings->recording)) : std::nullopt);
   if (const double lead_s = recorded.arm_clock_lead_s(); std::abs(lead_s) > 0.3)
     std::printf("the arm's clock is %.2f s %s the camera's, by when both were recorded\n", std::abs(lead_s),
@@ -75,8 +75,8 @@ int decide_on_recording(const ServoOptions& options) {
   lapservo::run(recorded, recorded, recorded, config, trajectory, asked_s, watcher);
   std::printf("decided on %.1f s of a recording, %d images and the joints; nothing was sent%s\n", watcher.duration_s(),
               recorded.images_given(), watcher.summary().holds_text().c_str());
-  say_remark(options.replay, recorded.complaint());
-  say_remark(options.replay, recorded.joint_remark());
+  say_remark(options.recorded.input, recorded.complaint());
+  say_remark(options.recorded.input, recorded.joint_remark());
   return folder.commit() && watcher.acted() && !(options.strict && watcher.summary().registration_contradicted()) ? 0
                                                                                                                   : 1;
 }
