@@ -276,24 +276,20 @@ void wait_on_page(WebView& web, const std::function<bool()>& done) {
   while (!interrupted() && !web.take_wishes().stop && !done()) clock.sleep_until(clock.now_s() + 0.005);
 }
 
-// /tf and the rest of FrameTopics. Begins with the first frame, with which the rig is known.
-class Publishing {
- public:
+// /tf and the rest of FrameTopics, of the rig that is known with the first frame.
+struct Publishing {
   explicit Publishing(const TrackOptions& options)
-      : frames_(frame_names_of(options.tf_frames)),
-        transport_(make_transport(options.publish, live_node_name, "--publish")) {}
-  void publish(const std::shared_ptr<const Rig>& rig, const std::vector<Observation>& observations, double age_s) {
-    if (rig != rig_) topics_.emplace(*transport_, *rig, frames_);
-    rig_ = rig;
+      : frames(frame_names_of(options.tf_frames)),
+        transport(make_transport(options.publish, live_node_name, "--publish")) {}
+  void publish(const Rig& rig, const std::vector<Observation>& observations, double age_s) {
+    if (!topics) topics.emplace(*transport, rig, frames);
     for (std::size_t i = 0; i < observations.size(); ++i)
-      topics_->publish(i, observations[i], rig->instruments[i].camera_from_rcm, transport_->stamp_now_s() - age_s);
+      topics->publish(i, observations[i], rig.instruments[i].camera_from_rcm, transport->stamp_now_s() - age_s);
   }
 
- private:
-  FrameNames frames_;
-  std::unique_ptr<Transport> transport_;
-  std::shared_ptr<const Rig> rig_;
-  std::optional<FrameTopics> topics_;  // last: it uses the transport
+  FrameNames frames;
+  std::unique_ptr<Transport> transport;
+  std::optional<FrameTopics> topics;  // last: it uses the transport
 };
 
 // One run of either command: where frames come from, and where what was seen in them goes.
@@ -370,6 +366,7 @@ class TrackRun {
       const double came_s = clock_.now_s() - (live_ ? live_->age_s() : 0);
       Tracker& tracker = rigs_.tracker_for(*frame);
       try {
+        if (rig_ != rigs_.rig()) begin_rig();
         set_wrists(tracker, *frame, came_s);
         const auto& observations =
             frame->flaw ? tracker.refuse(*frame->flaw) : tracker.track(frame->bgr, frame->time_s);
@@ -377,7 +374,7 @@ class TrackRun {
         for (std::size_t i = 0; i < observations.size(); ++i) wrists_[i].add(observations[i], frame->time_s);
         if (const auto frames_ago = registration_.add(observations)) say_moved(options_, *frame, *frames_ago);
         lossy_ |= has_jpeg_extension(frame->file);
-        diagnosis().add(frame->bgr, observations);
+        diagnosis_->add(frame->bgr, observations);
         if ((stopped_ = !pass_on(*frame, observations, came_s))) return;
         ++passed_on_;
       } catch (const InputError& error) {
@@ -390,22 +387,24 @@ class TrackRun {
     }
   }
 
-  // Readings of the wrists at the frame's exposure. Once a rig, the reason why an instrument has no tip.
-  void set_wrists(Tracker& tracker, const Frame& frame, double came_s) {
-    const std::vector<Instrument>& instruments = rigs_.rig()->instruments;
-    const bool is_new = wrists_of_ != rigs_.rig();
-    if (is_new) {
-      say_without_readings();
-      wrists_of_ = rigs_.rig();
-      wrists_.clear();
+  // Says once a rig why an instrument has no tip.
+  void begin_rig() {
+    say_without_readings();
+    rig_ = rigs_.rig();
+    diagnosis_.emplace(*rig_, options_.deinterlace || rig_->camera.deinterlace);
+    if (publishing_) publishing_->topics.reset();
+    wrists_.clear();
+    for (std::size_t i = 0; i < rig_->instruments.size(); ++i) {
+      wrists_.push_back(live_wrist_ ? WristInput{std::nullopt, other_wrist_text(options_.joints, *rig_, i)}
+                                    : find_wrist_input(options_, *rig_, i, source_, true));
+      say_no_tip(rig_->instruments[i], no_tip_text(rig_->instruments[i], wrists_[i]));
     }
-    for (std::size_t i = 0; i < instruments.size(); ++i) {
-      const Instrument& instrument = instruments[i];
-      if (is_new) {
-        wrists_.push_back(live_wrist_ ? WristInput{std::nullopt, other_wrist_text(options_.joints, *rigs_.rig(), i)}
-                                      : find_wrist_input(options_, *rigs_.rig(), i, source_, true));
-        say_no_tip(instrument, no_tip_text(instrument, wrists_[i]));
-      }
+  }
+
+  // Readings of the wrists at the frame's exposure.
+  void set_wrists(Tracker& tracker, const Frame& frame, double came_s) {
+    for (std::size_t i = 0; i < wrists_.size(); ++i) {
+      const Instrument& instrument = rig_->instruments[i];
       if (!instrument.tool) continue;
       const bool is_live = live_wrist_ && wrists_[i].none.empty();
       tracker.set_wrist(
@@ -420,7 +419,7 @@ class TrackRun {
   // Once behind the frames of a rig.
   void say_without_readings() const {
     for (std::size_t i = 0; i < wrists_.size(); ++i) {
-      const Instrument& instrument = wrists_of_->instruments[i];
+      const Instrument& instrument = rig_->instruments[i];
       say_no_tip(instrument, no_reading_text(instrument, wrists_[i]));
     }
   }
@@ -430,7 +429,7 @@ class TrackRun {
     for (const Observation& observation : observations)
       if (csv_) csv_->add(observation_csv_row(frame.index, frame.time_s, frame.file.filename().string(), observation));
     if (overlay_) overlay_->add(frame, draw_overlay(frame.bgr, *rigs_.rig(), observations));
-    if (publishing_) publishing_->publish(rigs_.rig(), observations, clock_.now_s() - came_s);
+    if (publishing_) publishing_->publish(*rig_, observations, clock_.now_s() - came_s);
     if (!web_) return true;
     web_->show({frame.bgr, rigs_.rig(), observations, clock_.now_s() - came_s});
     return !web_->take_wishes().stop;
@@ -462,14 +461,6 @@ class TrackRun {
     return tally_.anything() ? 0 : 1;
   }
 
-  FrameDiagnosis& diagnosis() {
-    if (!diagnosis_ || diagnosed_ != rigs_.rig()) {
-      diagnosed_ = rigs_.rig();
-      diagnosis_.emplace(*diagnosed_, options_.deinterlace || diagnosed_->camera.deinterlace);
-    }
-    return *diagnosis_;
-  }
-
   const TrackOptions& options_;
   RigByFrame rigs_;
   std::unique_ptr<LiveFrames> live_;
@@ -480,14 +471,13 @@ class TrackRun {
   std::optional<RowFile> csv_;
   std::optional<OverlayWriter> overlay_;
   std::optional<LiveWrist> live_wrist_;
-  std::shared_ptr<const Rig> wrists_of_;
-  std::vector<WristInput> wrists_;  // an instrument, by that rig
+  std::shared_ptr<const Rig> rig_;  // the last frame's
+  std::vector<WristInput> wrists_;  // of its instruments
   SteadyClock clock_;
   double begin_s_ = 0;
   Tally tally_;
   int passed_on_ = 0;  // frames
   RegistrationWatch registration_;
-  std::shared_ptr<const Rig> diagnosed_;
   std::optional<FrameDiagnosis> diagnosis_;  // of frames with that rig
   bool stopped_ = false, read_to_the_end_ = false, lossy_ = false;
 };
