@@ -7,7 +7,6 @@ namespace lapservo::app {
 // Each adds its subcommand (one file each).
 void add_align(Command app);
 void add_calibrate(Command app);
-void add_calibrate_all(Command calibrate);
 void add_calibrate_camera(Command calibrate);
 void add_calibrate_colour(Command calibrate);
 void add_calibrate_marker(Command calibrate);

@@ -355,9 +355,7 @@ int run_all(AllOptions options) {
   return Guide(options).run();
 }
 
-}  // namespace
-
-void add_calibrate_all(Command parent) {
+void add_all(Command parent) {
   auto [command, options] = parent.add_subcommand<AllOptions>(
       "all", "The guided way: camera, colour, marker, registration, check, each where it is not done yet.", run_all);
   command.add_option("--rig", options.rig, required(), "The rig as it is known so far; each step replaces it");
@@ -399,6 +397,27 @@ void add_calibrate_all(Command parent) {
       "--swing swing.mp4 --joints joints.csv --report check.html\n"
       "  lapservo calibrate all --rig rig.yaml --camera ros2:/endoscope/image_raw --robot ros2:PSM1 --enable-motion "
       "--joint-limits configs/joint_limits/psm-classic.yaml");
+}
+
+}  // namespace
+
+void add_calibrate(Command app) {
+  Command calibrate = app.add_subcommand("calibrate", "Measure what a rig says, and write it down.");
+  calibrate.require_subcommand();
+  calibrate.footer(
+      "Examples:\n"
+      "  lapservo calibrate all --rig rig.yaml --turn turn.mp4 --swing swing.mp4 --joints joints.csv\n"
+      "  lapservo calibrate camera boards/ --board 9x6 --square-mm 5 --rig rig.yaml\n"
+      "  lapservo calibrate colour motion.mp4 --rig rig.yaml --out rig.yaml\n"
+      "  lapservo calibrate marker turn.mp4 --rig rig.yaml --out rig.yaml\n"
+      "  lapservo calibrate registration swing.mp4 --joints joints.csv --rig rig.yaml --out rig.yaml\n"
+      "  lapservo calibrate tip --pivot pivot.mp4 --rig rig.yaml --out rig.yaml");
+  add_all(calibrate);
+  add_calibrate_camera(calibrate);
+  add_calibrate_colour(calibrate);
+  add_calibrate_marker(calibrate);
+  add_calibrate_registration(calibrate);
+  add_calibrate_tip(calibrate);
 }
 
 }  // namespace lapservo::app
