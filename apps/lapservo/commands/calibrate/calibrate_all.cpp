@@ -35,11 +35,10 @@ using namespace internal;
 namespace {
 namespace fs = std::filesystem;
 
-struct AllOptions : FrameOptions {
-  std::string rig, boards, board, aruco, motion, turn, swing, joints, judged, judged_joints, report, instrument, redo;
-  std::string joint_topic;
+struct AllOptions : CalibrateOptions {
+  std::string boards, motion, turn, swing, judged, judged_joints, redo;
   std::string camera, robot, joint_limits;  // of a live system
-  std::optional<double> square_mm;
+  BoardOptions board;
   bool no_questions = false, enable_motion = false;
 };
 
@@ -47,9 +46,8 @@ struct AllOptions : FrameOptions {
 struct Step {
   std::string name, what_to_record;
   std::string* input;
-  const char* flag;                    // of the input
-  std::string joints;                  // of the arm meanwhile, where they are given
-  std::vector<std::string> arguments;  // beyond the subcommand, the input, the rig and the joints
+  const char* flag;    // of the input
+  std::string joints;  // of the arm meanwhile, where they are given
   std::function<int(const CalibrateOptions&)> run;
 };
 
@@ -134,22 +132,20 @@ class Guide {
 
   std::vector<Step> steps() {
     AllOptions& o = options_;
-    std::vector<std::string> board{"--board", o.board, "--square-mm", fmt::format("{}", o.square_mm.value_or(0))};
-    if (!o.aruco.empty()) board.insert(board.end(), {"--aruco", o.aruco});
     return {
         {"camera", "12 or more images of a chessboard: near, sharp, tilted to all sides, in every part of the image",
-         &o.boards, "--boards", "", board, [this](const auto& options) { return run_camera(options); }},
-        {"colour", "the mounted marker moved through the image, 10 s", &o.motion, "--motion", "", {}, calibrate_colour},
-        {"marker", to_record_turn, &o.turn, "--turn", "", {}, calibrate_marker},
-        {"registration", to_record_swing, &o.swing, "--swing", "", {}, calibrate_registration},
-        {"check", "another swing, or the same, with a full turn", &o.judged, "--check", o.judged_joints, {}, check}};
+         &o.boards, "--boards", "", [this](const auto& options) { return run_camera(options); }},
+        {"colour", "the mounted marker moved through the image, 10 s", &o.motion, "--motion", "", calibrate_colour},
+        {"marker", to_record_turn, &o.turn, "--turn", "", calibrate_marker},
+        {"registration", to_record_swing, &o.swing, "--swing", "", calibrate_registration},
+        {"check", "another swing, or the same, with a full turn", &o.judged, "--check", o.judged_joints, check}};
   }
 
   int run_camera(const CalibrateOptions& options) const {
     CalibrateCameraOptions camera;
     static_cast<FrameOptions&>(camera) = options;
     camera.inputs = {options.input}, camera.rig = options.rig;
-    camera.board = {options_.board, options_.aruco, options_.square_mm, {}};
+    camera.board = options_.board;
     return calibrate_camera(camera);
   }
 
@@ -164,38 +160,36 @@ class Guide {
 
   // As a user types it; where its page goes is no part of what was done.
   std::vector<std::string> arguments_of(const Step& step) const {
-    const bool check = step.name == "check", camera = step.name == "camera";
-    std::vector<std::string> all;
-    if (!check) all.push_back("calibrate");
-    all.insert(all.end(), {step.name, *step.input, "--rig", options_.rig});
-    if (!check && !camera) all.insert(all.end(), {"--out", options_.rig});
-    if (!step.joints.empty()) all.insert(all.end(), {"--joints", step.joints});
+    const bool camera = step.name == "camera";
     const CalibrateOptions options = options_of(step);
-    all.insert(all.end(), step.arguments.begin(), step.arguments.end());
-    const std::vector<std::pair<std::string, std::string>> of_frames{{"--eye", options_.eye},
-                                                                     {"--side-by-side", options_.side_by_side},
-                                                                     {"--colour-matrix", options_.colour_matrix},
-                                                                     {"--chroma-location", options_.chroma_location},
-                                                                     {"--image-topic", options.image_topic},
-                                                                     {"--joint-topic", options.joint_topic}};
-    for (const auto& [option, value] : of_frames)
+    std::vector<std::string> all{step.name, options.input};
+    if (step.name != "check") all.insert(all.begin(), "calibrate");
+    const auto add = [&](const char* option, const std::string& value) {
       if (!value.empty()) all.insert(all.end(), {option, value});
-    if (!camera && !options_.instrument.empty()) all.insert(all.end(), {"--instrument", options_.instrument});
-    if (options_.deinterlace) all.push_back("--deinterlace");
-    if (!camera) all.insert(all.end(), {"--fps", fmt::format("{}", options_.fps.value_or(options_.usual_fps))});
+    };
+    add("--rig", options.rig), add("--out", camera ? "" : options.out), add("--joints", options.joints);
+    if (camera) {
+      add("--board", options_.board.corners);
+      add("--square-mm", fmt::format("{}", options_.board.square_mm.value()));
+      add("--aruco", options_.board.dictionary);
+    }
+    add("--eye", options.eye), add("--side-by-side", options.side_by_side);
+    add("--colour-matrix", options.colour_matrix), add("--chroma-location", options.chroma_location);
+    add("--image-topic", options.image_topic), add("--joint-topic", options.joint_topic);
+    if (!camera) add("--instrument", options.instrument);
+    if (options.deinterlace) all.push_back("--deinterlace");
+    if (!camera) add("--fps", fmt::format("{}", options.fps.value_or(options.usual_fps)));
     return all;
   }
 
   CalibrateOptions options_of(const Step& step) const {
-    CalibrateOptions options;
-    static_cast<FrameOptions&>(options) = options_;
-    if (!has_topics(*step.input)) options.image_topic.clear();
-    options.input = *step.input, options.rig = options_.rig, options.joints = step.joints;
-    if (has_joints(step) && has_topics(step.joints.empty() ? *step.input : step.joints))
-      options.joint_topic = options_.joint_topic;
-    if (step.name != "check") options.out = options_.rig;
-    options.instrument = options_.instrument;
-    if (step.name == "check") options.report = options_.report;
+    CalibrateOptions options = options_;
+    options.input = *step.input, options.joints = step.joints;
+    if (!has_topics(options.input)) options.image_topic.clear();
+    if (!has_joints(step) || !has_topics(step.joints.empty() ? options.input : step.joints))
+      options.joint_topic.clear();
+    if (step.name == "check") return options;
+    options.out = options.rig, options.report.clear();
     return options;
   }
 
@@ -236,7 +230,7 @@ class Guide {
       return 0;
     }
     expect_recording(step);
-    if (step.name == "camera" && (options_.board.empty() || !options_.square_mm))
+    if (step.name == "camera" && (options_.board.corners.empty() || !options_.board.square_mm))
       throw InputError("--boards", "needs --board and --square-mm, for example --board 9x6 --square-mm 5");
     const CalibrationStep now{step.name, command_line(arguments_of(step)), state_of(step),
                               fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)))};
@@ -360,9 +354,9 @@ void add_all(Command parent) {
       "all", "The guided way: camera, colour, marker, registration, check, each where it is not done yet.", run_all);
   command.add_option("--rig", options.rig, required(), "The rig as it is known so far; each step replaces it");
   command.add_option("--boards", options.boards, "For the camera: images of a chessboard");
-  command.add_option("--board", options.board, "Its inner corners, COLUMNSxROWS, for example 9x6");
-  command.add_option("--square-mm", options.square_mm, between(0.1, 1000.0), "Width of its squares");
-  command.add_option("--aruco", options.aruco, "For a ChArUco board: its markers' dictionary");
+  command.add_option("--board", options.board.corners, "Its inner corners, COLUMNSxROWS, for example 9x6");
+  command.add_option("--square-mm", options.board.square_mm, between(0.1, 1000.0), "Width of its squares");
+  command.add_option("--aruco", options.board.dictionary, "For a ChArUco board: its markers' dictionary");
   command.add_option("--motion", options.motion, "For the colours: the marker in motion; else --swing, else --turn");
   command.add_option("--turn", options.turn, "For the marker: a slow full turn about the shaft's axis, there and back");
   command.add_option("--swing", options.swing, "For the registration: a smooth swing");
