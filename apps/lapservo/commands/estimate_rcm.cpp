@@ -119,10 +119,6 @@ RcmResult pairwise_result(const std::vector<LineObservation>& lines, const RcmRe
   return result;
 }
 
-std::string number_or_empty(std::optional<double> value) {
-  return value ? fmt::format("{:.6g}", *value) : "";
-}
-
 // CSV with a header and a row per result; absent values are empty.
 void write_rcm_results(std::ostream& out, const std::vector<RcmResult>& results) {
   out << "instrument,method,status,lines,outliers,rcm_u_px,rcm_v_px,sigma_u_px,sigma_v_px,correlation,noise_px,"
@@ -131,26 +127,21 @@ void write_rcm_results(std::ostream& out, const std::vector<RcmResult>& results)
     const RcmEstimate& e = r.estimate;
     const auto point = r.is_ok() ? std::optional(e.point_px) : std::nullopt;
     const auto covariance = r.is_ok() ? e.covariance_px2 : std::nullopt;
-    const auto of = [](const auto& optional, auto get) {
-      return optional ? std::optional<double>(get(*optional)) : std::nullopt;
-    };
-    const auto sigma = [&](Eigen::Index i) {
-      return of(covariance, [&](const Eigen::Matrix2d& c) { return std::sqrt(c(i, i)); });
-    };
-    const auto u = [](const Eigen::Vector2d& p) { return p.x(); };
-    const auto v = [](const Eigen::Vector2d& p) { return p.y(); };
     std::string row =
         fmt::format("{},{},{},{},{}", csv_field(r.instrument), r.method, to_string(e.status), e.lines, e.outliers);
-    const auto correlation = [](const Eigen::Matrix2d& c) {
-      const double scale = std::sqrt(c(0, 0) * c(1, 1));
-      return scale > 0 ? c(0, 1) / scale : 0;
+    const auto add = [&](std::optional<double> value) { row += value ? fmt::format(",{:.6g}", *value) : ","; };
+    const auto add_both = [&](const std::optional<Eigen::Vector2d>& of) {
+      for (Eigen::Index i = 0; i < 2; ++i) add(of ? std::optional((*of)[i]) : std::nullopt);
     };
-    const auto distance = point && r.rig_px ? std::optional((*point - *r.rig_px).norm()) : std::nullopt;
-    for (const auto& value : {of(point, u), of(point, v), sigma(0), sigma(1), of(covariance, correlation), r.noise_px,
-                              r.chi2, r.spread_rad})
-      row += "," + number_or_empty(value);
+    add_both(point);
+    const auto sigmas_px = covariance ? std::optional(covariance->diagonal().cwiseSqrt().eval()) : std::nullopt;
+    add_both(sigmas_px);
+    const double scale = covariance ? std::sqrt((*covariance)(0, 0) * (*covariance)(1, 1)) : 0;
+    add(covariance ? std::optional(scale > 0 ? (*covariance)(0, 1) / scale : 0) : std::nullopt);
+    add(r.noise_px), add(r.chi2), add(r.spread_rad);
     row += r.is_ok() && e.near_parallel ? ",1" : ",0";
-    for (const auto& value : {of(r.rig_px, u), of(r.rig_px, v), distance}) row += "," + number_or_empty(value);
+    add_both(r.rig_px);
+    add(point && r.rig_px ? std::optional((*point - *r.rig_px).norm()) : std::nullopt);
     out << row << '\n';
   }
 }

@@ -139,8 +139,7 @@ Instrument chosen(const RigOptions& options, const Rig& rig) {
   inputs.add_rig(options.rig, rig);
   inputs.refuse_as_output(options.out);
   if (options.instrument.empty()) return rig.instruments.front();
-  if (const auto index = instrument_index(rig, options.instrument)) return rig.instruments[*index];
-  throw InputError("--instrument", "name", options.instrument, "an instrument of " + options.rig);
+  return rig.instruments[named_instrument(rig, options.instrument, options.rig, "--instrument")];
 }
 
 // A sheet that is drawn by what was measured on a print repeats that print's errors, and the camera's hues as inks.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <iterator>
 #include <map>
 
 #include <fmt/format.h>
@@ -37,23 +38,22 @@ Told psi_by_print(const Marker& rig, const Marker& measured) {
   return {std::sqrt(std::max(0.0, squares / steps - mean * mean)), std::sqrt(variance / steps)};
 }
 
-template <typename Value>
-double median_over(const std::vector<FrameEvidence>& frames, Value value) {
-  std::vector<double> values;
-  for (const FrameEvidence& frame : frames)
-    if (frame.light) values.push_back(value(frame));
-  return values.empty() ? 0 : median(values);
-}
-
-std::optional<MarkerLight> typical_light(const std::vector<FrameEvidence>& frames) {
-  if (std::ranges::none_of(frames, [](const FrameEvidence& f) { return f.light.has_value(); })) return std::nullopt;
-  MarkerLight light;
-  light.clipped = median_over(frames, [](const FrameEvidence& f) { return f.light->clipped; });
-  light.value = median_over(frames, [](const FrameEvidence& f) { return f.light->value; });
-  light.chroma = median_over(frames, [](const FrameEvidence& f) { return f.light->chroma; });
-  for (std::size_t band = 0; band < 3; ++band)
-    light.hues_deg[band] = median_over(frames, [&](const FrameEvidence& f) { return f.light->hues_deg[band]; });
-  return light;
+// Medians of the frames that show the marker.
+void add_light(const std::vector<FrameEvidence>& frames, const Marker& marker, RigFindings& findings) {
+  std::vector<FrameEvidence> lit;
+  std::ranges::copy_if(frames, std::back_inserter(lit), [](const FrameEvidence& f) { return f.light.has_value(); });
+  if (lit.empty()) return;
+  const auto typical = [&](auto value) {
+    return median(values_of(lit, [=](const FrameEvidence& f) { return std::invoke(value, *f.light); }));
+  };
+  MarkerLight& light = findings.light.emplace();
+  light.clipped = typical(&MarkerLight::clipped), light.value = typical(&MarkerLight::value);
+  light.chroma = typical(&MarkerLight::chroma);
+  for (std::size_t band = 0; band < 3; ++band) {
+    light.hues_deg[band] = typical([=](const MarkerLight& of) { return of.hues_deg[band]; });
+    findings.hue_error_deg = std::max(findings.hue_error_deg, hue_gap_deg(light.hues_deg[band], marker.hues_deg[band]));
+  }
+  findings.width_px = median(values_of(lit, &FrameEvidence::width_px));
 }
 
 class Advisor {
@@ -344,13 +344,8 @@ RigFindings findings_of(const Rig& rig, std::size_t instrument, const RigEvidenc
   if (!failures.empty())
     findings.failure = std::ranges::max_element(failures, {}, [](const auto& one) { return one.second; })->first;
   findings.picture = evidence.picture();
-  findings.light = typical_light(frames);
-  findings.width_px = median_over(frames, [](const FrameEvidence& f) { return f.width_px; });
   const Instrument& of = rig.instruments[instrument];
-  if (findings.light)
-    for (std::size_t band = 0; band < 3; ++band)
-      findings.hue_error_deg =
-          std::max(findings.hue_error_deg, hue_gap_deg(findings.light->hues_deg[band], of.marker.hues_deg[band]));
+  add_light(frames, of.marker, findings);
   findings.response = evidence.response();
   findings.response_measured = rig.camera.response.sigma.has_value();
   findings.registered = of.camera_from_rcm.has_value();

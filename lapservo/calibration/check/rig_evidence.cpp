@@ -52,21 +52,21 @@ RigEvidence::RigEvidence(const Rig& rig, std::size_t instrument, Cores cores)
       response_(rig.camera),
       worker_(cores == Cores::two ? 1 : 0) {}
 
-void RigEvidence::look_at_light(const cv::Mat& bgr, const Observation& seen, FreeSight& sight) {
+void RigEvidence::look_at_light(const cv::Mat& bgr, const Observation& seen, Unfinished& frame) {
   const Marker& marker = rig_.instruments[instrument_].marker;
   // Each edge costs as much as tracking a frame: some of a long recording's are enough.
   constexpr std::size_t every = 3;
   const ShaftPose pose{seen.camera_from_unrolled, seen.psi_rad};
   if ((frames_.size() + unfinished_.size()) % every == 0) response_.add(bgr, marker, pose);
-  sight.light = light_of_marker(bgr, rig_.camera, marker, pose);
-  if (!sight.light) return;
-  sight.width_px = marker.diameter_m * rig_.camera.fx_px / seen.camera_from_unrolled.translation.z();
+  frame.light = light_of_marker(bgr, rig_.camera, marker, pose);
+  if (!frame.light) return;
+  frame.width_px = marker.diameter_m * rig_.camera.fx_px / seen.camera_from_unrolled.translation.z();
 }
 
-bool RigEvidence::look_with(FreeTrackers& trackers, const cv::Mat& bgr, double time_s, FreeSight& sight) {
+bool RigEvidence::look_with(FreeTrackers& trackers, const cv::Mat& bgr, double time_s, Unfinished& frame) {
   const Observation& seen = trackers.at.track(bgr)[instrument_];
   if (seen.status != Status::ok) return false;
-  look_at_light(bgr, seen, sight);
+  look_at_light(bgr, seen, frame);
   if (!seen.marker) return true;
   // From the one to the other, as then errors of either matter least; a wrong focal length made more so may find
   // nothing.
@@ -87,7 +87,8 @@ bool RigEvidence::add(const cv::Mat& bgr, double time_s) {
   // apart, as now the one and then the other takes longer.
   constexpr std::size_t most_unfinished = 4;
   finish_all_but(most_unfinished - 1);
-  auto as_it_is = worker_.run([this, bgr, time_s](std::size_t) {
+  Unfinished unfinished;
+  unfinished.as_it_is = worker_.run([this, bgr, time_s](std::size_t) {
     key_frames_.add(bgr, time_s);
     const Observation& seen = as_it_is_.track(bgr)[instrument_];
     FrameEvidence frame{time_s, seen.status, seen.marker ? seen.marker->sigma_roll_rad : 0, seen.marker, {}, {}, 0};
@@ -95,9 +96,8 @@ bool RigEvidence::add(const cv::Mat& bgr, double time_s) {
     return frame;
   });
   pictures_.push_back(light_of_picture(bgr));
-  FreeSight free;
-  const bool found = look_with(exact_, bgr, time_s, free) || look_with(tolerant_, bgr, time_s, free);
-  unfinished_.push_back({std::move(as_it_is), free});
+  const bool found = look_with(exact_, bgr, time_s, unfinished) || look_with(tolerant_, bgr, time_s, unfinished);
+  unfinished_.push_back(std::move(unfinished));
   return found;
 }
 
@@ -106,7 +106,7 @@ void RigEvidence::finish_all_but(std::size_t unfinished) const {
     Unfinished next = std::move(unfinished_.front());
     unfinished_.pop_front();
     FrameEvidence frame = next.as_it_is.get();
-    frame.light = next.free.light, frame.width_px = next.free.width_px;
+    frame.light = next.light, frame.width_px = next.width_px;
     frames_.push_back(frame);
   }
 }

@@ -61,19 +61,15 @@ class RigEvidence {
     FreeTrackers(const Rig& rig, double tolerance_m);
     Tracker at, longer, shorter;
   };
-  // Their measurements of the marker.
-  struct FreeSight {
+  // A frame that the second core may not have looked at yet, and what these have of it.
+  struct Unfinished {
+    std::future<FrameEvidence> as_it_is;
     std::optional<MarkerLight> light;
     double width_px = 0;
   };
-  // A frame that the second core may not have looked at yet.
-  struct Unfinished {
-    std::future<FrameEvidence> as_it_is;
-    FreeSight free;
-  };
   // Whether the marker was found.
-  bool look_with(FreeTrackers& trackers, const cv::Mat& bgr, double time_s, FreeSight& sight);
-  void look_at_light(const cv::Mat& bgr, const Observation& seen, FreeSight& sight);
+  bool look_with(FreeTrackers& trackers, const cv::Mat& bgr, double time_s, Unfinished& frame);
+  void look_at_light(const cv::Mat& bgr, const Observation& seen, Unfinished& frame);
   void finish_all_but(std::size_t unfinished) const;
 
   Rig rig_;

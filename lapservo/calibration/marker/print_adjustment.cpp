@@ -342,15 +342,12 @@ std::optional<PrintCovariance> print_covariance(ceres::Problem& problem, SharedU
   return scaled.allFinite() ? std::optional(scaled) : std::nullopt;
 }
 
-// d(a number of the rig)/d(print_numbers).
-PrintNumbers unit(int number) {
-  return number < 0 ? PrintNumbers::Zero() : PrintNumbers(PrintNumbers::Unit(number));
-}
+// d(a boundary's place at either edge)/d(print_numbers).
 PrintNumbers upper_row(int boundary) {
-  return unit(boundary - 1);
+  return boundary == 0 ? PrintNumbers::Zero() : PrintNumbers(PrintNumbers::Unit(boundary - 1));
 }
 PrintNumbers lower_row(int boundary) {
-  return unit(3 + boundary);
+  return PrintNumbers::Unit(3 + boundary);
 }
 
 }  // namespace
@@ -441,7 +438,7 @@ MarkerSigmas sigmas_of(const PrintCovariance& covariance, MarkerSigmas others) {
   others.bands_upper_m = upper, others.bands_lower_m = lower;
   others.wrap_m = sigma(lower_row(0));
   others.skew_m = sigma(lower_row(3) - lower_row(0) - upper_row(3));
-  others.gap_rad = sigma(unit(7));
+  others.gap_rad = sigma(PrintNumbers::Unit(7));
   return others;
 }
 

@@ -9,10 +9,12 @@
 
 #include <Eigen/Core>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "lapservo/control/paper_trajectory.h"
 #include "lapservo/core/csv.h"
 #include "lapservo/core/error.h"
+#include "lapservo/core/statistics.h"
 #include "lapservo/crtk/arm_limits.h"
 #include "lapservo/crtk/crtk_robot.h"
 #include "lapservo/crtk/joint_map.h"
@@ -53,9 +55,7 @@ ControllerConfig controller_of(const ServoOptions& options, const Rig& rig) {
 }
 
 std::string names_of(const Rig& rig) {
-  std::string names;
-  for (const Instrument& instrument : rig.instruments) names += (names.empty() ? "" : ", ") + instrument.name;
-  return names;
+  return fmt::format("{}", fmt::join(values_of(rig.instruments, &Instrument::name), ", "));
 }
 
 // PSM1 of ros2:/dvrk/PSM1; empty without an arm.
