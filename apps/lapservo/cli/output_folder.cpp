@@ -22,10 +22,6 @@ namespace fs = std::filesystem;
 constexpr auto unfinished_name = "unfinished";
 constexpr auto mark_name = ".lapservo-run";  // the names of the results, one a line
 
-[[noreturn]] void fail(const fs::path& path, const std::error_code& error) {
-  throw InputError(path.string(), "can't be written: " + error.message());
-}
-
 // Hidden ones apart.
 std::vector<std::string> names_in(const fs::path& folder) {
   std::vector<std::string> names;
@@ -107,7 +103,8 @@ void move_up(const fs::path& from, const fs::path& to, const std::string& name) 
 }  // namespace
 
 OutputFolder::Unfinished::Unfinished(const fs::path& folder) : path(folder / unfinished_name) {
-  if (::mkdir(path.c_str(), 0777) != 0) fail(folder, {errno, std::generic_category()});
+  if (::mkdir(path.c_str(), 0777) != 0)
+    throw InputError(folder.string(), std::string("can't be written: ") + std::strerror(errno));
   lock = locked(folder, path);
 }
 

@@ -50,9 +50,7 @@ class Recording {
       : fps_(options.fps), recorder_(options.out) {
     if (!options.robot.empty()) subscribe_joints(transports, address_of(options.robot, "--robot"));
     const cv::Size size = rig ? cv::Size(rig->camera.width_px, rig->camera.height_px) : cv::Size();
-    input_ = open_images(options.camera, "--camera", size, transports,
-                         names_topic(options.camera) ? sink_of_topic(recorded_topic(options.camera))
-                                                     : sink_of_camera(recorded_topic(options.camera), clock));
+    input_ = open_images(options.camera, "--camera", size, transports, sink_of(options.camera, clock));
   }
 
   RecordedCounts counts() const { return recorder_.counts(); }
@@ -78,18 +76,15 @@ class Recording {
           recorder_.add(topic, std::move(message));
         });
   }
-  ImageSink sink_of_topic(const std::string& topic) {
-    return {[this, topic](ImageMessage&& message) { add(topic, std::move(message)); },
-            [this, topic](CompressedImageMessage&& message) { add(topic, std::move(message)); }};
-  }
-  // Stamps of this computer's cameras are on the monotonic clock, or missing; joints' are on that of 1970.
-  ImageSink sink_of_camera(const std::string& topic, const Clock& clock) {
-    return {[this, topic, &clock](ImageMessage&& message) {
+  ImageSink sink_of(const std::string& camera, const Clock& clock) {
+    const std::string topic = recorded_topic(camera);
+    return {[this, topic, &clock, has_stamps = names_topic(camera)](ImageMessage&& message) {
+              // Those of this computer's cameras are on the monotonic clock, or missing; joints' are on that of 1970.
               const double age_s = std::isfinite(message.stamp_s) ? clock.now_s() - message.stamp_s : 0;
-              message.stamp_s = since_1970_s() - age_s;
+              if (!has_stamps) message.stamp_s = since_1970_s() - age_s;
               add(topic, std::move(message));
             },
-            {}};
+            [this, topic](CompressedImageMessage&& message) { add(topic, std::move(message)); }};
   }
 
   double fps_, next_image_s_ = 0;

@@ -126,7 +126,7 @@ class LiveWrist {
 // The inputs that are known before the first frame; rigs beside the frames come with them.
 InputFiles inputs_of(const TrackOptions& options) {
   InputFiles inputs;
-  inputs.add(options.input), inputs.add(options.joints), inputs.add_pictures_in(options.input);
+  inputs.add_recording(options.input), inputs.add(options.joints);
   return inputs;
 }
 

@@ -48,9 +48,10 @@ void InputFiles::add_rig(const fs::path& path, const Rig& rig) {
   internal::each_file(rig, [this](const fs::path& file) { add(file); });
 }
 
-void InputFiles::add_pictures_in(const fs::path& folder) {
+void InputFiles::add_recording(const fs::path& path) {
+  add(path);
   std::error_code error;
-  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error))
+  for (fs::directory_iterator entry(path, error), end; !error && entry != end; entry.increment(error))
     if (has_image_extension(entry->path()) || entry->path().extension() == ".yaml" ||
         internal::ends_like(entry->path().string(), {".db3", ".mcap", ".mp4", ".json"}))
       add(entry->path());

@@ -24,8 +24,8 @@ class InputFiles {
   void add(const std::filesystem::path& path);
   /// The file and the camera's, where the rig has one.
   void add_rig(const std::filesystem::path& path, const Rig& rig);
-  /// The images in a folder and the rigs beside them, or a bag's files; none of what is no folder.
-  void add_pictures_in(const std::filesystem::path& folder);
+  /// A file, or the images in a folder and the rigs beside them, or a bag's files.
+  void add_recording(const std::filesystem::path& path);
 
   /// Throws InputError when the file is one of them.
   void refuse_as_output(const std::filesystem::path& path) const;

@@ -60,13 +60,11 @@ LiveImages::LiveImages(const std::string& text, const std::string& option, const
                        Transports& transports)
     : clock_(clock),
       receiver_(camera.width_px, camera.height_px, names_topic(text) ? StampsBy::sender : StampsBy::loop),
-      input_(open_images(text, option, {camera.width_px, camera.height_px}, transports, sink())) {
+      input_(open_images(
+          text, option, {camera.width_px, camera.height_px}, transports,
+          {[this](ImageMessage&& image) { receiver_.receive(std::move(image), clock_.now_s()); },
+           [this](CompressedImageMessage&& image) { receiver_.receive(std::move(image), clock_.now_s()); }})) {
   if (names_topic(text)) say_if_undistorted(text, &camera);
-}
-
-ImageSink LiveImages::sink() {
-  return {[this](ImageMessage&& message) { receiver_.receive(std::move(message), clock_.now_s()); },
-          [this](CompressedImageMessage&& message) { receiver_.receive(std::move(message), clock_.now_s()); }};
 }
 
 }  // namespace lapservo::app

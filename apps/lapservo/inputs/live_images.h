@@ -68,8 +68,6 @@ class LiveImages : public ImageStream {
   bool take_second_sender() override { return receiver_.take_second_sender(); }
 
  private:
-  ImageSink sink();
-
   const Clock& clock_;
   internal::ImageReceiver receiver_;
   ImageInput input_;  // last: it uses the others

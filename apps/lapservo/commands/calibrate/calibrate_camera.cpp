@@ -26,7 +26,7 @@ void check_files(const CalibrateCameraOptions& options, const std::optional<Rig>
   if (options.rig.empty() && options.out.empty() && options.camera_info.empty())
     throw InputError("calibrate camera", "has no place for its result, expected --rig, --out or --camera-info");
   InputFiles files;
-  for (const std::string& input : options.inputs) files.add(input), files.add_pictures_in(input);
+  for (const std::string& input : options.inputs) files.add_recording(input);
   for (const std::string& place : {options.rig_out(), options.camera_info}) files.refuse_as_output(place);
   refuse_shared_place({options.rig_out(), options.camera_info});
   for (const std::string& place : {options.camera_info, rig ? std::string() : options.out}) {

@@ -96,7 +96,7 @@ InstrumentJob::InstrumentJob(const CalibrateOptions& given, bool with_frames)
       rig(load_rig(options.rig)),
       index(instrument_meant(rig, options.instrument, options.rig)) {
   InputFiles inputs;
-  for (const std::string& input : {options.input, options.joints}) inputs.add(input), inputs.add_pictures_in(input);
+  for (const std::string& input : {options.input, options.joints}) inputs.add_recording(input);
   for (const std::string& place : {options.out, options.report, options.dvrk.base_frame})
     inputs.refuse_as_output(place);
   refuse_shared_place({options.out, options.report, options.dvrk.base_frame});

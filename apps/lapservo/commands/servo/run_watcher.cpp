@@ -25,8 +25,7 @@ InputFiles inputs_of(const ServoOptions& options, const Rig& rig) {
   inputs.add(options.controller);
   inputs.add(options.trajectory);
   inputs.add(options.joint_limits);
-  inputs.add(options.recorded.input);
-  if (!options.recorded.input.empty()) inputs.add_pictures_in(options.recorded.input);
+  inputs.add_recording(options.recorded.input);
   return inputs;
 }
 
