@@ -166,7 +166,7 @@ TEST(CalibrateMarkerByVideo, OneWayMayLeaveTheSeamBehind) {
   std::vector<TrueFrame> frames = rendered_frames(set);
   const auto measured = [&](bool files) {
     TurnsFrames source(frames, files);
-    return measure_marker(set.rig, 0, {source, "turn"}, std::nullopt, {}).calibration;
+    return measure_marker(set.rig, 0, {source, "turn"}, std::nullopt, {});
   };
   compress(frames, Encoder::lapservo);
   const MarkerCalibration video = measured(false), pictures = measured(true);

@@ -119,18 +119,17 @@ py::dict calibrate_colour(const py::object& frames, const py::object& rig, const
   const std::size_t index = named_instrument(given.rig, instrument, given.name(), "instrument");
   const GivenFrames source(frames, fps, &given.rig.camera, deinterlace);
   const JobWatch watch = watch_of(progress);
-  const ColourMeasurement measured = unlocked([&] {
+  const ColourCalibration calibration = unlocked([&] {
     return measure_colour(given.rig, index, {*source.source, source.name, deinterlace}, replace_response, watch);
   });
-  const ColourCalibration& calibration = measured.calibration;
   expect_result(calibration.refusal, source.name);
   const Instrument& before = given.rig.instruments[index];
   return result_of(GivenRig{with_colour(given.rig, index, calibration), given.path}, {},
-                   calibrated_numbers(before.marker, calibration), measured.read.complaint, calibration,
+                   calibrated_numbers(before.marker, calibration), calibration.read.complaint, calibration,
                    "instrument"_a = before.name, "hues_deg"_a = calibration.hues_deg,
                    "sigma_hues_deg"_a = calibration.sigma_hues_deg, "response"_a = calibration.response_found,
                    "found_before"_a = calibration.found_before, "found"_a = calibration.found,
-                   "frames"_a = measured.frames);
+                   "frames"_a = calibration.frames);
 }
 
 // A CSV's path, or columns by name: through the same table, by as many digits as reads back to the last bit.
@@ -173,18 +172,18 @@ py::dict calibrate_marker(const py::object& frames, const py::object& rig, const
   const std::optional<JointInput> turn = joints_of(joints, before, given.name());
   const GivenFrames source(frames, fps, &given.rig.camera, deinterlace);
   const JobWatch watch = watch_of(progress);
-  const MarkerMeasurement measured = unlocked([&] {
+  const MarkerCalibration calibration = unlocked([&] {
     return measure_marker(given.rig, index, {*source.source, source.name, deinterlace}, turn, watch);
   });
-  const MarkerCalibration& calibration = measured.calibration;
   expect_result(calibration.refusal, source.name);
   GivenRig after = given;
   after.rig.instruments[index].marker = calibration.marker;
   return result_of(after, {}, calibrated_numbers(before.marker, calibration.marker, turn.has_value()),
-                   measured.read.complaint, calibration, "instrument"_a = before.name,
-                   "looked_at"_a = measured.read.looked_at, "found"_a = measured.found, "frames"_a = calibration.frames,
-                   "seam_views"_a = calibration.seam_views, "before_px"_a = calibration.before_px,
-                   "after_px"_a = calibration.after_px, "seam_may_lag"_a = calibration.seam_may_lag);
+                   calibration.read.complaint, calibration, "instrument"_a = before.name,
+                   "looked_at"_a = calibration.read.looked_at, "found"_a = calibration.found,
+                   "frames"_a = calibration.frames, "seam_views"_a = calibration.seam_views,
+                   "before_px"_a = calibration.before_px, "after_px"_a = calibration.after_px,
+                   "seam_may_lag"_a = calibration.seam_may_lag);
 }
 
 Eigen::Matrix<double, Eigen::Dynamic, 4> residuals_of(const Registration& registration) {

@@ -259,6 +259,7 @@ void SpreadFrames::add(const cv::Mat& bgr) {
 ColourCalibration calibrate_colour(const Rig& rig, std::size_t instrument, const std::vector<cv::Mat>& frames,
                                    bool keep_response, bool lossy, const JobWatch& watch) {
   ColourCalibration calibration;
+  calibration.frames = frames.size();
   int step = 0;
   const auto progress = [&](const char* what) { watch.tell(std::nullopt, ++step, fmt::format(": {}", what)); };
   if (frames.size() < min_colour_frames)
@@ -333,29 +334,28 @@ cv::Mat segmentation_picture(const cv::Mat& bgr, const Rig& rig) {
   return picture;
 }
 
-ColourMeasurement measure_colour(const Rig& rig, std::size_t instrument, const FrameRecording& recording,
+ColourCalibration measure_colour(const Rig& rig, std::size_t instrument, const FrameRecording& recording,
                                  bool replace_response, const JobWatch& watch) {
   constexpr std::size_t most = 48;
   SpreadFrames kept(most);
   const bool live = recording.source.kind() == FrameSource::Kind::live;
-  ColourMeasurement measured;
-  measured.read = read_frames(recording, rig, live ? 10 : 1, watch, [&](const cv::Mat& bgr, double) {
+  const FramesRead read = read_frames(recording, rig, live ? 10 : 1, watch, [&](const cv::Mat& bgr, double) {
     kept.add(bgr);
     return fmt::format(", {} kept", kept.frames().size());
   });
-  if (measured.read.stopped) return measured.calibration.refusal = "stopped", measured;
-  measured.frames = kept.frames().size();
+  ColourCalibration calibration;
+  if (read.stopped) return calibration.refusal = "stopped", calibration;
   const bool is_named = recording.source.is_srgb();
   const bool keep_response = is_named || (!replace_response && rig.camera.response.sigma.has_value());
-  measured.calibration = calibrate_colour(rig, instrument, kept.frames(), keep_response, measured.read.lossy, watch);
-  if (is_named) measured.calibration.response_found = "as it is: the recording names how it encodes light";
-  if (!measured.calibration.refusal.empty() &&
-      2 * measured.calibration.found_before < static_cast<int>(measured.frames)) {
+  calibration = calibrate_colour(rig, instrument, kept.frames(), keep_response, read.lossy, watch);
+  calibration.read = read;
+  if (is_named) calibration.response_found = "as it is: the recording names how it encodes light";
+  if (!calibration.refusal.empty() && 2 * calibration.found_before < static_cast<int>(calibration.frames)) {
     FrameDiagnosis diagnosis(rig);
     for (const cv::Mat& bgr : kept.frames()) diagnosis.add(bgr, {});
-    measured.calibration.refusal += diagnosis.cause();
+    calibration.refusal += diagnosis.cause();
   }
-  return measured;
+  return calibration;
 }
 
 std::vector<CalibratedNumber> calibrated_numbers(const Marker& before, const ColourCalibration& calibration) {

@@ -32,6 +32,8 @@ struct ColourCalibration {
   std::string response_found;                          ///< what they say, in words
   std::vector<std::string> faults;  ///< of the frames' colours, that show beyond the noise: the sigmas count them
   int found_before = 0, found = 0;  ///< of the frames
+  std::size_t frames = 0;
+  FramesRead read;  ///< of measure_colour()
 };
 
 /// The hues of a mounted marker's bands as the camera has them, and how it encodes light, from frames of it in motion
@@ -44,17 +46,10 @@ ColourCalibration calibrate_colour(const Rig& rig, std::size_t instrument, const
 /// The frame in grey, with what is one of the rig's colours painted in its hue.
 cv::Mat segmentation_picture(const cv::Mat& bgr, const Rig& rig);
 
-/// Colours, measured, and in how many frames.
-struct ColourMeasurement {
-  ColourCalibration calibration;  ///< or its refusal
-  std::size_t frames = 0;
-  FramesRead read;
-};
-
 /// Calibrates by a marker in motion, a live camera's until it is stopped. A response that calibrate camera measured
 /// stays without `replace_response`, and any that images are read by as they say themselves. Throws InputError as
 /// read_frames().
-ColourMeasurement measure_colour(const Rig& rig, std::size_t instrument, const FrameRecording& recording,
+ColourCalibration measure_colour(const Rig& rig, std::size_t instrument, const FrameRecording& recording,
                                  bool replace_response, const JobWatch& watch);
 
 /// The hues, in degrees.

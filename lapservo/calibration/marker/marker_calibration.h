@@ -63,6 +63,8 @@ struct MarkerCalibration {
   std::vector<std::string> faults;    ///< of the print, that show beyond the noise: the sigmas count them
   std::vector<PrintResidual> before;  ///< for the rig's print
   std::vector<KeyFrame> key_frames;   ///< those used, where the calibrated marker has them
+  int found = 0;                      ///< frames of a recording with the marker in it
+  FramesRead read;                    ///< of measure_marker()
 };
 
 /// Bands, wrap, skew and gap of the rig's marker from frames of a full rotation. The diameter stays: images give

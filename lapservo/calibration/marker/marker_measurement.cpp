@@ -50,36 +50,37 @@ double psi_of(const ShaftPose& pose, const Rigid3& camera_from_rcm) {
 
 }  // namespace
 
-MarkerMeasurement measure_marker(const Rig& rig, std::size_t index, const FrameRecording& recording,
+MarkerCalibration measure_marker(const Rig& rig, std::size_t index, const FrameRecording& recording,
                                  const std::optional<JointInput>& joints, const JobWatch& watch) {
   constexpr int enough = 400;  // frames of a video lie close together: more of them add no information
   const Instrument& instrument = rig.instruments[index];
   KeyFrames key_frames(rig, index);
   FrameDiagnosis diagnosis(rig);
-  MarkerMeasurement measured;
-  measured.read =
+  const FramesRead read =
       read_frames(recording, rig, every_of(recording.source, enough), watch, [&](const cv::Mat& bgr, double time_s) {
         if (!key_frames.add(bgr, time_s)) diagnosis.add(bgr, {});
         return fmt::format(", {} in {}", instrument.name, key_frames.found());
       });
-  measured.found = key_frames.found();
-  if (measured.read.stopped) return measured.calibration.refusal = "stopped", measured;
-  if (measured.found == 0) {
-    measured.calibration.refusal =
-        fmt::format("{} is in none of {} frames{}: look at the rig's hues_deg and diameter_m{}", instrument.name,
-                    measured.read.looked_at, measured.read.remark_on_damaged(), diagnosis.cause());
-    return measured;
+  MarkerCalibration calibration;
+  const int found = key_frames.found();
+  if (read.stopped) {
+    calibration.refusal = "stopped";
+  } else if (found == 0) {
+    calibration.refusal = fmt::format("{} is in none of {} frames{}: look at the rig's hues_deg and diameter_m{}",
+                                      instrument.name, read.looked_at, read.remark_on_damaged(), diagnosis.cause());
+  } else {
+    calibration = calibrate_marker(rig, index, key_frames.take(), watch);
+    if (!calibration.refusal.empty() && 2 * found < read.looked_at && !watch.stopped())
+      calibration.refusal += diagnosis.cause();
   }
-  measured.calibration = calibrate_marker(rig, index, key_frames.take(), watch);
-  if (!measured.calibration.refusal.empty() && 2 * measured.found < measured.read.looked_at && !watch.stopped())
-    measured.calibration.refusal += diagnosis.cause();
-  if (measured.read.jpegs == measured.read.looked_at) measured.calibration.seam_may_lag = false;
-  if (!joints || !measured.calibration.refusal.empty()) return measured;
-  const SeamRegistration seam = register_seam(instrument, measured.calibration, joints->recording);
+  calibration.found = found, calibration.read = read;
+  if (read.jpegs == read.looked_at) calibration.seam_may_lag = false;
+  if (!joints || !calibration.refusal.empty()) return calibration;
+  const SeamRegistration seam = register_seam(instrument, calibration, joints->recording);
   if (!seam.refusal.empty()) throw InputError(joints->source, seam.refusal);
-  measured.calibration.marker.seam_rad = seam.seam_rad;
-  measured.calibration.marker.sigmas.seam_rad = seam.sigma_rad;
-  return measured;
+  calibration.marker.seam_rad = seam.seam_rad;
+  calibration.marker.sigmas.seam_rad = seam.sigma_rad;
+  return calibration;
 }
 
 void expect_registration(const Instrument& instrument, const std::string& rig, const std::string& joints_option) {

@@ -11,16 +11,9 @@
 
 namespace lapservo::internal {
 
-/// A print, measured.
-struct MarkerMeasurement {
-  MarkerCalibration calibration;  ///< or its refusal
-  int found = 0;                  ///< frames with the marker in it
-  FramesRead read;
-};
-
 /// Calibrates by some hundred frames of a rotation about the shaft's axis; with joints the place of the seam, too.
 /// Throws InputError as read_frames(), and naming the joints' source where they don't determine the seam.
-MarkerMeasurement measure_marker(const Rig& rig, std::size_t instrument, const FrameRecording& recording,
+MarkerCalibration measure_marker(const Rig& rig, std::size_t instrument, const FrameRecording& recording,
                                  const std::optional<JointInput>& joints, const JobWatch& watch);
 
 /// Throws InputError naming `rig` when the instrument lacks what the seam is measured through.

@@ -374,12 +374,8 @@ void add_all(Command parent) {
       "Move the arm for these recordings, see `lapservo record --move`; else a person does, guided by questions");
   command.add_option("--joint-limits", options.joint_limits, "For --enable-motion: YAML of the arm's joints");
   command.add_option("--report", options.report, "The check's HTML page with figures");
-  command.add_option("--instrument", options.instrument, "Its name, where the rig has several");
-  add_image_topic_option(command, options.image_topic);
+  add_recording_options(command, options);
   add_joint_topic_option(command, options.joint_topic);
-  add_video_options(command, options);
-  command.add_flag("--deinterlace", options.deinterlace, "For interlaced video: measure the field of the even rows");
-  command.add_option("--fps", options.fps, between(0.001, 1000.0), "Frames per second of folders of images; else 30");
   command.add_option("--redo", options.redo, one_of({"camera", "colour", "marker", "registration", "check"}),
                      "A step that is done again though it was done, with those after it");
   command.add_flag("--no-questions", options.no_questions, "Leave out what no option names; a terminal prompts for it");

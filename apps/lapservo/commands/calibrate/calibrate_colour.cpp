@@ -10,9 +10,9 @@ namespace lapservo::app {
 using namespace internal;
 namespace {
 
-void print(const Instrument& instrument, const ColourCalibration& calibration, std::size_t frames) {
+void print(const Instrument& instrument, const ColourCalibration& calibration) {
   std::printf("%s: found in %d of %zu frames before, in %d after\n\n          hue before   after   sigma [deg]\n",
-              instrument.name.c_str(), calibration.found_before, frames, calibration.found);
+              instrument.name.c_str(), calibration.found_before, calibration.frames, calibration.found);
   for (std::size_t band = 0; band < 3; ++band)
     std::printf("  band %zu   %8.1f   %7.1f   %5.1f\n", band, instrument.marker.hues_deg[band],
                 calibration.hues_deg[band], calibration.sigma_hues_deg[band]);
@@ -25,12 +25,11 @@ void print(const Instrument& instrument, const ColourCalibration& calibration, s
 int calibrate_colour(const CalibrateOptions& options) {
   InstrumentJob job(options);
   job.begin();
-  const ColourMeasurement measured =
+  const ColourCalibration calibration =
       measure_colour(job.rig, job.index, job.recording(), options.replace_response, watched_job());
-  const ColourCalibration& calibration = measured.calibration;
-  say_complaint(options.input, measured.read.complaint);
+  say_complaint(options.input, calibration.read.complaint);
   if (!calibration.refusal.empty()) return job.refuse(calibration.refusal);
-  print(job.instrument(), calibration, measured.frames);
+  print(job.instrument(), calibration);
   job.rig = with_colour(std::move(job.rig), job.index, calibration);
   return job.write();
 }

@@ -47,12 +47,11 @@ int calibrate_marker(const CalibrateOptions& options) {
     joints.value().source = options.joints;
   }
   job.begin();
-  const MarkerMeasurement measured = measure_marker(job.rig, job.index, job.recording(), joints, watched_job());
-  const MarkerCalibration& calibration = measured.calibration;
-  say_complaint(options.input, measured.read.complaint);
+  const MarkerCalibration calibration = measure_marker(job.rig, job.index, job.recording(), joints, watched_job());
+  say_complaint(options.input, calibration.read.complaint);
   if (!calibration.refusal.empty()) return job.refuse(calibration.refusal);
   std::printf("%s: found in %d of %d frames; %zu from all sides are used, %zu of them show the seam\n",
-              instrument.name.c_str(), measured.found, measured.read.looked_at, calibration.frames,
+              instrument.name.c_str(), calibration.found, calibration.read.looked_at, calibration.frames,
               calibration.seam_views);
   print_table(calibrated_numbers(instrument.marker, calibration.marker, joints.has_value()));
   std::printf("\nboundaries miss the print by %.3f px rms before, %.3f px after\n", calibration.before_px,
