@@ -96,19 +96,19 @@ py::dict calibrate_camera(const py::list& pictures, const std::string& corners, 
       complaint.append(complaint.empty() ? "" : "; ").append(several ? frames.name + ": " : "").append(latest);
   }
   const std::vector<std::string> without_board = recordings.without_board();
-  const CameraMeasurement measured =
+  const CameraCalibration calibration =
       unlocked([&] { return measure_camera(board, std::move(recordings), before, watch); });
-  const CameraCalibration& calibration = measured.calibration;
   expect_result(calibration.refusal, name);
   const Camera camera = measured_camera(calibration);
   if (given) given->rig.camera = camera, given->rig.camera_file.clear();
   py::list views;
-  for (std::size_t i = 0; i < measured.views.size(); ++i)
-    views.append(py::make_tuple(measured.views[i].name, measured.views[i].corners.size(), calibration.view_rms_px[i]));
+  for (std::size_t i = 0; i < calibration.views.size(); ++i)
+    views.append(
+        py::make_tuple(calibration.views[i].name, calibration.views[i].corners.size(), calibration.view_rms_px[i]));
   const auto& response = calibration.response;
   return result_of(given, camera, calibrated_numbers(before, calibration), complaint, calibration, "camera"_a = camera,
                    "rms_px"_a = calibration.rms_px, "noise"_a = calibration.noise, "views"_a = views,
-                   "without_board"_a = without_board, "advice"_a = measured.advice,
+                   "without_board"_a = without_board, "advice"_a = calibration.advice,
                    "sigma_response"_a = response ? std::optional(response->sigma) : std::nullopt,
                    "sharpening"_a = response ? response->sharpening : 0.0);
 }

@@ -58,6 +58,8 @@ struct CameraCalibration {
   double rms_px = 0;
   double noise = 1;                 ///< how many times the edges' own noise that is, of all colours; robust
   std::vector<std::string> faults;  ///< that show beyond the noise, one sentence each: the sigmas count them
+  std::vector<BoardView> views;     ///< of measure_camera(): those that it was measured by
+  std::string advice;               ///< likewise: what more images should show; empty when nothing is missing
   double bright_wider_px = 0;  ///< with the calibrated response, green: 0 for a board whose squares are equally wide
 };
 

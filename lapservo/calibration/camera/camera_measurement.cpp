@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <system_error>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -104,24 +105,25 @@ void BoardRecordings::look_at(FrameSource& source, const std::string& name, cons
   read_.complaint = read_.stopped ? "" : source.complaint();
 }
 
-CameraMeasurement measure_camera(const Board& board, BoardRecordings recordings, const Camera& start,
+CameraCalibration measure_camera(const Board& board, BoardRecordings recordings, const Camera& start,
                                  const JobWatch& watch) {
-  CameraMeasurement measured;
+  CameraCalibration calibration;
   const FramesRead& read = recordings.read();
-  if (read.stopped) return measured.calibration.refusal = "stopped", measured;
-  measured.views = recordings.take_views();
-  if (measured.views.empty()) {
-    measured.calibration.refusal = read.all_damaged()
-                                       ? text_of_damaged(read.damaged, read.damaged)
-                                       : fmt::format(
-                                             "the board is in none of {} images{}: look at the board's number of inner "
-                                             "corners, show it wholly, sharp, with a white margin",
-                                             read.looked_at, read.remark_on_damaged());
-    return measured;
+  if (read.stopped) return calibration.refusal = "stopped", calibration;
+  std::vector<BoardView> views = recordings.take_views();
+  if (views.empty()) {
+    calibration.refusal = read.all_damaged()
+                              ? text_of_damaged(read.damaged, read.damaged)
+                              : fmt::format(
+                                    "the board is in none of {} images{}: look at the board's number of inner "
+                                    "corners, show it wholly, sharp, with a white margin",
+                                    read.looked_at, read.remark_on_damaged());
+    return calibration;
   }
-  measured.calibration = calibrate_camera(board, measured.views, start, watch);
-  measured.advice = advice(measured.views, *recordings.size());
-  return measured;
+  calibration = calibrate_camera(board, views, start, watch);
+  calibration.advice = advice(views, *recordings.size());
+  calibration.views = std::move(views);
+  return calibration;
 }
 
 Camera measured_camera(const CameraCalibration& calibration) {

@@ -56,15 +56,8 @@ class BoardRecordings {
   std::vector<std::string> without_board_;
 };
 
-/// A camera, measured, and the images that it was measured by.
-struct CameraMeasurement {
-  CameraCalibration calibration;  ///< or its refusal
-  std::vector<BoardView> views;
-  std::string advice;  ///< what more images should show; empty when nothing is missing
-};
-
-/// Counts of the recordings.
-CameraMeasurement measure_camera(const Board& board, BoardRecordings recordings, const Camera& start,
+/// Calibrates by what was gathered.
+CameraCalibration measure_camera(const Board& board, BoardRecordings recordings, const Camera& start,
                                  const JobWatch& watch);
 
 /// The camera with its sigmas and covariance to the digits of a rig's file, and the response's sigma.

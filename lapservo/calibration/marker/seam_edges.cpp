@@ -80,6 +80,10 @@ struct SeamView {
            along_m * axes.col(2);
   }
   double azimuth(double x_m) const { return upper_rad + x_m / marker().radius_m(); }
+  double px_per_m(double azimuth_rad, double along_m) const {
+    const auto image = scene.camera.raw_with_jacobian(point(azimuth_rad, along_m));
+    return (image.d_px_d_point * around(azimuth_rad)).norm();
+  }
   LampLight lamp_light(double azimuth_rad, double facing_rad) const {
     constexpr double least_matt = 0.05;  // so that shading can make up for other lamps
     const Eigen::Vector3d to_camera = -point(azimuth_rad, marker().length_m() / 2).normalized();
@@ -129,11 +133,7 @@ std::optional<Section> sample(const SeamView& view, double facing_rad, double bl
   const Marker& marker = view.marker();
   const double radius_m = marker.radius_m(), gap_m = marker.gap_rad * radius_m;
   const double middle_m = marker.length_m() / 2;
-  const auto scale_at = [&](double x_m) {
-    const double azimuth_rad = view.azimuth(x_m);
-    const auto image = view.scene.camera.raw_with_jacobian(view.point(azimuth_rad, middle_m));
-    return (image.d_px_d_point * view.around(azimuth_rad)).norm();
-  };
+  const auto scale_at = [&](double x_m) { return view.px_per_m(view.azimuth(x_m), middle_m); };
   const double here = scale_at(0);
   if (!(here > 1)) return std::nullopt;
   const double flank_m = (3 * blur_px + 4) / here, left_m = -gap_m - reach_m - flank_m, right_m = reach_m + flank_m;
@@ -425,9 +425,7 @@ std::optional<SeamEdges> measure_seam(const Scene& scene, const LightImage& ligh
   for (const Profile& profile : section->profiles)
     along_m += profile.stations * profile.along_m, weight += profile.stations;
   along_m /= weight;
-  const auto middle = scene.camera.raw_with_jacobian(view.point(view.upper_rad, along_m));
-  const double px_per_m = (middle.d_px_d_point * view.around(view.upper_rad)).norm();
-  const double radius_m = marker.radius_m();
+  const double px_per_m = view.px_per_m(view.upper_rad, along_m), radius_m = marker.radius_m();
   const SeamSearch search{gap_m, reach_m, free_gap ? reach_m : 0, radius_m, px_per_m};
   std::optional<SeamFit> found;
   if (grey != nullptr && processing) {

@@ -49,7 +49,8 @@ void look_at(const std::string& input, const CalibrateCameraOptions& options, co
   say_complaint(input, recordings.read().complaint);
 }
 
-void print_result(const std::vector<BoardView>& views, const CameraCalibration& calibration) {
+void print_result(const CameraCalibration& calibration) {
+  const std::vector<BoardView>& views = calibration.views;
   const Camera& camera = calibration.camera;
   std::printf("%zu views; edges miss the fit by %.3f px rms, %.1f times their noise\n", views.size(),
               calibration.rms_px, calibration.noise);
@@ -108,12 +109,11 @@ int calibrate_camera(const CalibrateCameraOptions& options) {
     if (recordings.read().stopped) break;
   }
   const auto without_board = recordings.without_board();
-  const CameraMeasurement measured = measure_camera(board, std::move(recordings), before, watched_job());
-  const auto& [calibration, views, more] = measured;
+  const CameraCalibration calibration = measure_camera(board, std::move(recordings), before, watched_job());
   if (!calibration.refusal.empty()) return refuse(options.input(), calibration.refusal + "; nothing was written");
   for (const std::string& name : without_board) std::printf("left out, there is no board: %s\n", name.c_str());
-  print_result(views, calibration);
-  if (!more.empty()) std::printf("better still: %s\n", more.c_str());
+  print_result(calibration);
+  if (!calibration.advice.empty()) std::printf("better still: %s\n", calibration.advice.c_str());
   write_results(options, rig, read, measured_camera(calibration));
   if (rig && std::any_of(rig->instruments.begin(), rig->instruments.end(),
                          [](const Instrument& instrument) { return instrument.camera_from_rcm.has_value(); }))
