@@ -36,7 +36,6 @@ namespace {
 struct CheckedRig {
   RigFindings findings;
   std::vector<FrameEvidence> frames;
-  std::vector<SigmaMap> maps;
   std::vector<Advice> advice;
   std::string exact_registration;  // exact_registration_text()
   std::string tip;                 // how well it is known, or why not; empty without a tool
@@ -226,11 +225,12 @@ std::vector<Figure> figures_of(const CheckedRig& checked) {
   }
   figures.push_back(
       {sigma_plot(checked.frames), "Sigma of the rotation, as the tracker states it, in each frame where it is ok."});
-  for (const SigmaMap& map : checked.maps)
-    figures.push_back({map_picture(map),
-                       fmt::format("Sigma of psi [mrad] to expect with the marker in each part of the image, {:.0f} "
-                                   "mm away. Dark: it is wholly in view, and not found.",
-                                   1e3 * map.depth_m)});
+  if (f.work_space)
+    for (const SigmaMap& map : f.work_space->maps)
+      figures.push_back({map_picture(map),
+                         fmt::format("Sigma of psi [mrad] to expect with the marker in each part of the image, {:.0f} "
+                                     "mm away. Dark: it is wholly in view, and not found.",
+                                     1e3 * map.depth_m)});
   figures.push_back({light_plot(checked.frames), "Median over the marker. Near 255 boundaries are lost."});
   if (f.print && f.print->refusal.empty())
     figures.push_back(
@@ -275,7 +275,7 @@ CheckLines check_lines(const CheckedRig& checked) {
   lines.insert(lines.end(), more.begin(), more.end());
   if (!checked.exact_registration.empty()) lines.push_back({"standard deviations", checked.exact_registration});
   if (!checked.tip.empty()) lines.push_back({"tip", checked.tip});
-  if (f.work_space)
+  if (f.work_space && f.work_space->places > 0)
     lines.push_back(
         {"work space", fmt::format("sigma of psi at most {:.0f} mrad in {:.0f} % of {} places, up to {:.1f}",
                                    1e3 * rig_limits.sigma_rad, 100 * f.work_space->good, f.work_space->places,
@@ -398,8 +398,7 @@ int check(const CalibrateOptions& options) {
     else
       checked.findings.rcm = check_rcm(instrument, evidence.poses());
     progress.show(2, " of 3: the work space");
-    WorkSpaceSurvey survey = survey_work_space(rig, index, evidence);
-    checked.maps = std::move(survey.maps), checked.findings.work_space = survey.work_space;
+    checked.findings.work_space = survey_work_space(rig, index, evidence);
     progress.show(3, " of 3: the print");
     if (print.valid()) checked.findings.print = print.get();
   }

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
@@ -51,8 +53,21 @@ struct RcmCheck {
 };
 RcmCheck check_rcm(const Instrument& instrument, const std::vector<TimedPose>& poses);
 
+/// One standard deviation of the roll about the shaft, over the image at one depth.
+struct SigmaMap {
+  static constexpr int columns = 7, rows = 5;
+  double depth_m = 0;  ///< of the marker's middle
+  static constexpr std::size_t cells = static_cast<std::size_t>(columns) * rows;
+  /// By row, the median over three rotations, of which one that is not found counts as the largest; empty where the
+  /// marker is not wholly in view or is not found.
+  std::array<std::optional<double>, cells> sigma_rad{};
+  /// Where it is in view, but at most of the rotations not found.
+  std::array<bool, cells> lost{};
+};
+
 /// Sigma of psi that the rig has over its work space.
 struct WorkSpace {
+  std::vector<SigmaMap> maps{};    ///< at the near and the far end of where the marker was
   double good = 1, worst_rad = 0;  ///< fraction with at most RigLimits::sigma_rad
   int places = 0, lost = 0;        ///< looked at; of them, not good, those where the marker is not found
 };

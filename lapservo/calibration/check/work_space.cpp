@@ -145,15 +145,14 @@ std::vector<SigmaMap> sigma_maps(const Rig& rig, std::size_t instrument, const s
   return maps;
 }
 
-WorkSpaceSurvey survey_work_space(const Rig& rig, std::size_t instrument, const RigEvidence& evidence) {
-  WorkSpaceSurvey survey;
+std::optional<WorkSpace> survey_work_space(const Rig& rig, std::size_t instrument, const RigEvidence& evidence) {
   const auto measured = measured_sigmas(evidence, rig.instruments[instrument].marker);
-  if (measured.empty()) return survey;
-  survey.maps =
-      sigma_maps(rig, instrument, depths_of(evidence.poses(), rig.instruments[instrument].marker.length_m()), measured);
+  if (measured.empty()) return std::nullopt;
   WorkSpace work_space;
+  work_space.maps =
+      sigma_maps(rig, instrument, depths_of(evidence.poses(), rig.instruments[instrument].marker.length_m()), measured);
   int good = 0;
-  for (const SigmaMap& map : survey.maps) {
+  for (const SigmaMap& map : work_space.maps) {
     const auto lost = static_cast<int>(std::count(map.lost.begin(), map.lost.end(), true));
     work_space.places += lost, work_space.lost += lost;
     for (const auto& sigma_rad : map.sigma_rad) {
@@ -162,10 +161,8 @@ WorkSpaceSurvey survey_work_space(const Rig& rig, std::size_t instrument, const 
       work_space.worst_rad = std::max(work_space.worst_rad, *sigma_rad);
     }
   }
-  if (work_space.places == 0) return survey;
-  work_space.good = static_cast<double>(good) / work_space.places;
-  survey.work_space = work_space;
-  return survey;
+  if (work_space.places > 0) work_space.good = static_cast<double>(good) / work_space.places;
+  return work_space;
 }
 
 }  // namespace lapservo::internal

@@ -22,13 +22,13 @@ struct TipSighting {
 
 struct TipCalibration {
   /// Why there is none, and what to do about it: then nothing else counts. Empty when there is one.
-  std::string refusal;
-  Tool tool;                     ///< in its place
-  bool with_offsets = false;     ///< the azimuth of the wrist and its joints' offsets were measured, too
-  double sigma_m = 0;            ///< of the tip, in the direction in which it is known worst
-  std::vector<double> misses_m;  ///< of the tip from its point, by sighting
-  double noise = 0;              ///< how many times their sigmas they are; robust
-  std::string fault;             ///< that shows beyond the noise: the covariance counts it. Empty without one
+  std::string refusal{};
+  Tool tool{};                     ///< in its place
+  bool with_offsets = false;       ///< the azimuth of the wrist and its joints' offsets were measured, too
+  double sigma_m = 0;              ///< of the tip, in the direction in which it is known worst
+  std::vector<double> misses_m{};  ///< of the tip from its point, by sighting
+  double noise = 0;                ///< how many times their sigmas they are; robust
+  std::string fault{};             ///< that shows beyond the noise: the covariance counts it. Empty without one
 };
 
 /// From poses of a marker whose tip rests in a dimple while the shaft turns about it, with constant readings of the

@@ -34,9 +34,7 @@ TipCalibration by_pivot(const CalibrateTipOptions& options, const Rig& rig, std:
   // A wrist has to stand still: whatever the delay, its readings are the same.
   const WristInput wrist = find_wrist_input(options, rig, index, *frames, false);
   const MeasuredPoses poses = poses_in_frames(rig, index, {*frames, options.input, options.deinterlace}, watched_job());
-  TipCalibration refused;
-  refused.refusal = poses.none;
-  if (!refused.refusal.empty()) return refused;
+  if (!poses.none.empty()) return {.refusal = poses.none};
   say_complaint(options.input, poses.read.complaint);
   if (tool.wrist.empty()) return pivoted_tip(tool, std::vector<double>(), poses.all);
   if (!wrist.readings) {
@@ -71,9 +69,7 @@ TipCalibration by_calliper(const CalibrateTipOptions& options, const Rig& rig, s
   if (!distance_mm || !sigma_mm || *distance_mm < 0 || *distance_mm > most_mm || !(*sigma_mm > 0) || *sigma_mm > 5)
     throw InputError("--calliper", "distance", options.calliper,
                      "0 to 500 mm, or with its standard deviation of 5 mm at most MM:SIGMA, for example 21.4:0.1");
-  TipCalibration result;
-  result.tool = placed_by_calliper(tool, rig.instruments[index].marker, 1e-3 * *distance_mm, 1e-3 * *sigma_mm);
-  return result;
+  return {.tool = placed_by_calliper(tool, rig.instruments[index].marker, 1e-3 * *distance_mm, 1e-3 * *sigma_mm)};
 }
 
 void print(const TipCalibration& calibration) {
