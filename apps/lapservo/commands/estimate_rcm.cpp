@@ -2,7 +2,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdio>
-#include <filesystem>
 #include <map>
 #include <optional>
 #include <ostream>
@@ -31,7 +30,6 @@
 namespace lapservo::app {
 using namespace internal;
 namespace {
-namespace fs = std::filesystem;
 
 struct EstimateRcmOptions {
   std::string observations, rig, out;

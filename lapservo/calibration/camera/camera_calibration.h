@@ -6,7 +6,6 @@
 #include <utility>
 #include <vector>
 
-#include <Eigen/Core>
 #include <opencv2/core.hpp>
 
 #include "lapservo/calibration/camera/board.h"

@@ -33,7 +33,6 @@
 namespace lapservo::app {
 using namespace internal;
 namespace {
-namespace fs = std::filesystem;
 
 // As things are in the simulation, where `rig` is what the loop goes by.
 Rig true_rig_of(const ServoOptions& options, const Rig& rig) {
@@ -125,7 +124,7 @@ int replay_log(const ServoOptions& options, const Command& command) {
   for (const std::string& name : command.given())
     if (name != "--replay")
       throw InputError(name, "is given, expected none with a log: rig.yaml and controller.yaml beside it count");
-  const fs::path log = options.recorded.input, folder = log.parent_path();
+  const std::filesystem::path log = options.recorded.input, folder = log.parent_path();
   const std::string rig_file = (folder / "rig.yaml").string();
   Rig rig = first_instrument(load_rig(rig_file), rig_file);
   const ControllerConfig controller = load_controller(folder / "controller.yaml", {});
