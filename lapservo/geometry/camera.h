@@ -43,7 +43,7 @@ struct Camera {
   /// That of fx fy cx cy [px] k1 k2 p1 p2 k3. Without it `sigmas` count as independent, but for a third of the focal
   /// lengths' variance: mostly they have all of it in common, but the rig does not say.
   std::optional<Eigen::Matrix<double, 9, 9>> covariance = {};
-  /// Of these numbers: the covariance, or by the sigmas.
+  /// `covariance`, or what the sigmas say of it.
   Eigen::Matrix<double, 9, 9> known_covariance() const;
 
   bool operator==(const Camera&) const = default;
