@@ -5,6 +5,7 @@
 
 #include <Eigen/LU>
 
+#include "lapservo/vision/camera/processed_edge.h"
 #include "lapservo/vision/edges/blurred_edges.h"
 
 namespace lapservo::internal {
@@ -240,15 +241,10 @@ std::optional<CameraDeparture> find_departure(const LightImage& light, std::span
                                               double blur_px) {
   const ChannelGeometry& channels = light.channels();
   if (!(channels.corner_px > 0)) return std::nullopt;  // of a frame whose middle nobody gave
-  // For a value between two pixels: along straight lines.
-  const auto light_of = [&table = light.light_of_value()](float value) {
-    const float place = std::clamp(255 * value, 0.0F, 254.99F);
-    const auto i = static_cast<std::size_t>(place);
-    return table[i] + (place - static_cast<float>(i)) * (table[i + 1] - table[i]);
-  };
   PooledEdges glance = pool_edges(light, measurements, Look::glance);
   for (PooledEdge& edge : glance.all)
-    for (auto& channel : edge.value) std::ranges::transform(channel, channel.begin(), light_of);
+    for (auto& channel : edge.value)
+      for (float& value : channel) value = light_at(light.light_of_value(), value).y;
   if (!Disagreement(seen_in(channels, glance, blur_px)).is_plain()) return std::nullopt;
   // Means of values have dark edges, which look like another response.
   const PooledEdges edges = pool_edges(light, measurements, Look::light);

@@ -94,18 +94,6 @@ Eigen::Vector3d saturated_by(double saturation, const Eigen::Vector3d& bgr) {
   return grey + saturation * (bgr - grey);
 }
 
-// A value's light, or a light's value; with its slope.
-struct Encoding {
-  float y, slope;
-};
-
-Encoding light_at(const LightTable& table, double value) {
-  const float place = 255 * static_cast<float>(std::clamp(value, 0.0, 1.0));
-  const std::size_t i = std::min(table.size() - 2, static_cast<std::size_t>(place));
-  const float step = table[i + 1] - table[i];
-  return {table[i] + (place - static_cast<float>(i)) * step, 255 * step};
-}
-
 // `near`: an index to look from, which stays near the last light's. Where neighbouring values share a light, to within
 // what has an inverse, it is one of them, with a slope of 0.
 Encoding value_at(const LightTable& table, float light, std::size_t& near) {
@@ -144,7 +132,7 @@ Encoded encode(const LightTable& light_of_value, const PictureProcessing& proces
     for (int i = 0; i < edge_grid; ++i) {
       const BlurredEdge& here = blurred[static_cast<std::size_t>(i)];
       const auto distance_px = static_cast<float>(i - half_grid);
-      const float shade = std::max(0.1F, 1 + gradient * distance_px), even = before.y + here.step * step;
+      const float shade = std::max(0.0F, 1 + gradient * distance_px), even = before.y + here.step * step;
       const Encoding at = value_at(light_of_value, shade * even, near);
       out.value(i, c) = at.y;
       if (!derivatives) continue;
@@ -215,6 +203,13 @@ void add_plateau(const ProcessingFilters& filters, const OnGrid& by, const Eigen
 }
 
 }  // namespace
+
+Encoding light_at(const LightTable& table, double value) {
+  const float place = 255 * static_cast<float>(std::clamp(value, 0.0, 1.0));
+  const std::size_t i = std::min(table.size() - 2, static_cast<std::size_t>(place));
+  const float step = table[i + 1] - table[i];
+  return {table[i] + (place - static_cast<float>(i)) * step, 255 * step};
+}
 
 PictureProcessing processing_of(const ProcessingVector& unknowns) {
   using enum ProcessingUnknown::Index;

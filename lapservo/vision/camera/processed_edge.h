@@ -57,6 +57,13 @@ struct ProcessingFilters {
   ProcessingFilters(const PictureProcessing& processing, bool derivatives);
 };
 
+/// A value's light, or a light's value; with its slope.
+struct Encoding {
+  float y, slope;
+};
+/// For any value, linear between those of the table.
+Encoding light_at(const LightTable& table, double value);
+
 /// A camera's image of a step of light.
 EdgeSamples processed_edge(const LightTable& light_of_value, const ProcessingFilters& filters, const EdgeVector& edge);
 

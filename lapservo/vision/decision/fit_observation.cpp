@@ -45,7 +45,7 @@ Observation observed_line(const CentreLine& line, const Scene& scene, const Fine
 // is more than psi may have.
 std::optional<RcmPrior> doubted(const RcmPrior& registration, const ShaftPose& pose) {
   const Eigen::Vector3d to_rcm = registration.camera_from_rcm.translation - pose.camera_from_unrolled.translation;
-  const Eigen::Vector3d axis = pose.camera_from_unrolled.rotation * Eigen::Vector3d::UnitZ();
+  const Eigen::Vector3d axis = axis_of(pose);
   const double missed_m = to_rcm.cross(axis).norm(), missed_rad = std::atan2(missed_m, -to_rcm.dot(axis));
   if (!(missed_rad < validation_limits.max_sigma_psi_rad)) return std::nullopt;
   RcmPrior wide = registration;

@@ -29,7 +29,7 @@ InstrumentMemory remembered(const std::optional<InstrumentMemory>& before, const
 
 bool shows_the_rigs_print(const FineFit& fit) {
   const int fewest = *std::min_element(fit.used.begin(), fit.used.end());
-  return fewest > print_record_limits.wholly_located * fit.lines && fit.p_false < print_record_limits.most_p_false;
+  return fewest > print_record_limits.wholly_located * fit.lines && fit.p_false < print_limits.fraction_of_known;
 }
 
 void PrintRecord::begin_frame(double time_s) {

@@ -17,7 +17,8 @@ namespace lapservo::internal {
 class FrameClock {
  public:
   /// A power of two, so that equal steps are equal in doubles.
-  static constexpr double usual_period_s = 1.0 / 32;
+  static constexpr int frames_a_second = 32;
+  static constexpr double usual_period_s = 1.0 / frames_a_second;
 
   /// The next frame's time. Goes on by usual_period_s where its time is not known, or does not go on from the time
   /// before.
@@ -51,7 +52,8 @@ class LookSchedule {
   void passed() { frames_left_ = std::max(0, frames_left_ - 1); }
 
  private:
-  static constexpr int after_none = 15, longest_pause = 64;
+  static constexpr int after_none = FrameClock::frames_a_second / 2 - 1,
+                       longest_pause = 2 * FrameClock::frames_a_second;
   int frames_left_ = 0, pause_ = 1;
 };
 
@@ -75,7 +77,8 @@ InstrumentMemory remembered(const std::optional<InstrumentMemory>& before, const
 
 /// The evidence of a run's frames about a print.
 struct PrintRecordLimits {
-  double wholly_located = 0.8, most_p_false = 1e-4;  ///< the rig's: all boundaries on such a part, psi so rarely wrong
+  /// The rig's: all boundaries on such a part, psi wrong no oftener than print_limits.fraction_of_known.
+  double wholly_located = 0.8;
   /// From one so many sides away at most, and two that show much of the same (a camera sees four to either side).
   std::size_t near_sides = 2, in_view_sides = 5;
   double exchange_s = 2;                        ///< of which nothing was added for so long may be another instrument's

@@ -30,7 +30,7 @@ Boundaries boundaries_in_image(const Scene& scene, const ShaftPose& pose, int li
   Boundaries boundaries;
   const auto view = view_cylinder(pose.camera_from_unrolled, scene.marker.radius_m());
   if (!view) return boundaries;
-  const Eigen::Vector3d axis = pose.camera_from_unrolled.rotation * Eigen::Vector3d::UnitZ();
+  const Eigen::Vector3d axis = axis_of(pose);
   for (int i = 0; i < lines; ++i) {
     const double azimuth_rad = visible_azimuth_rad(*view, reach, i, lines);
     const double tau_rad = marker_azimuth_rad(scene.marker, azimuth_rad, pose.psi_rad);

@@ -87,15 +87,13 @@ int lines_in_clear_view(const Scene& scene, const ShaftPose& pose, std::size_t b
   constexpr double beside_px = 4;
   const auto view = view_cylinder(pose.camera_from_unrolled, scene.marker.radius_m());
   if (!view) return 0;
-  const Eigen::Vector3d axis = pose.camera_from_unrolled.rotation * Eigen::Vector3d::UnitZ();
   int count = 0;
   for (int i = 0; i < lines; ++i) {
     const double azimuth_rad = visible_azimuth_rad(*view, edge_limits.line_reach, i, lines);
     const double tau_rad = marker_azimuth_rad(scene.marker, azimuth_rad, pose.psi_rad);
     const double along_m = boundaries_m(scene.marker, tau_rad)[boundary];
     const Eigen::Vector3d point = point_on(pose, scene.marker, azimuth_rad, along_m);
-    const double px_per_m = (scene.camera.raw_with_jacobian(point).d_px_d_point * axis).norm();
-    const Eigen::Vector3d apart = 2 * beside_px / px_per_m * axis;
+    const Eigen::Vector3d apart = 2 * beside_px / px_per_m_along(scene.camera, pose, point) * axis_of(pose);
     const LineInImage<2> sides(scene, point - apart, apart);
     const auto is_ours = [&](std::size_t side) { return scene.is_ours(sides.class_on_shaft(side)); };
     count += (boundary == 0 || is_ours(0)) && (boundary == 3 || is_ours(1));
@@ -105,18 +103,18 @@ int lines_in_clear_view(const Scene& scene, const ShaftPose& pose, std::size_t b
 
 ColourAgreement colour_agreement(const Scene& scene, const ShaftPose& pose, const EdgeBlur& blur) {
   constexpr double length_beyond = 0.04, blurs_beyond = 2;
-  // About boundaries and the seam colours mix: so far, and at least this fraction of the length.
-  constexpr double blurred_px = 1.5, min_guard = 0.02;
+  // About boundaries and the seam colours mix: at least this fraction of the length.
+  constexpr double min_guard = 0.02;
   const auto view = view_cylinder(pose.camera_from_unrolled, scene.marker.radius_m());
   if (!view) return {};
   const double length_m = scene.marker.length_m();
-  const Eigen::Vector3d axis = pose.camera_from_unrolled.rotation * Eigen::Vector3d::UnitZ();
   const Eigen::Vector3d middle = point_on(pose, scene.marker, view->facing_azimuth_rad, length_m / 2);
-  const double px_per_m = (scene.camera.raw_with_jacobian(middle).d_px_d_point * axis).norm();
-  const double guard_m = std::max(min_guard * length_m, blurred_px / px_per_m);
+  const double px_per_m = px_per_m_along(scene.camera, pose, middle);
+  const double guard_m = std::max(min_guard * length_m, edge_limits.seam_px / px_per_m);
   const std::array blurred_m{std::max(guard_m, blurs_beyond * blur.along_px[0] / px_per_m),
                              std::max(guard_m, blurs_beyond * blur.along_px[3] / px_per_m)};
-  const SampledSurface<48> surface(scene, pose, *view, std::max(blurred_m[0], blurred_m[1]) + length_beyond * length_m);
+  const SampledSurface<surface_places> surface(scene, pose, *view,
+                                               std::max(blurred_m[0], blurred_m[1]) + length_beyond * length_m);
   ColourAgreement agreement;
   double total = 0, inside = 0;
   std::array<double, 2> beyond{}, going_on{};  // of both ends

@@ -37,7 +37,8 @@ struct EdgeLimits {
   /// One sigma of what the film moves a point by: this fraction of its square, by the blur. At the true pose (60
   /// frames, leaning by up to 60 degrees) 0.01 px are left of 0.3 px, 0.05 of 0.5, 0.06 of 0.9.
   double film_doubt = 0.3;
-  double seam_px = 1.5;  ///< boundaries that jump at the seam, by this and blur_reach near to it, are left out
+  /// About the seam and boundaries colours mix: ones that jump at the seam, by this and blur_reach near, are left out.
+  double seam_px = 1.5;
 };
 inline constexpr EdgeLimits edge_limits;
 

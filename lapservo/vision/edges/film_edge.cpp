@@ -17,7 +17,7 @@ struct FadingLine {
 
 // For the points that the line before has as inliers.
 FadingLine fading_line(std::span<const FadingPoint> points, const FadingLine& before) {
-  constexpr double inlier_sigmas = 3, least_spread = 1e-6;
+  constexpr double inlier_sigmas = 3, least_spread = std::numeric_limits<double>::epsilon();
   double x = 0, y = 0, xx = 0, xy = 0, yy = 0;
   FadingLine line;
   for (const FadingPoint& p : points) {

@@ -29,11 +29,11 @@ constexpr std::array<ErrorSize, Count> doubled_sizes(double least_mm) {
 /// Assumptions about prints. A print is the rig's, or its bands are off by one of these sizes; and, whatever its bands
 /// are, its middle ink may lie aside by one of these.
 struct PrintLimits {
-  std::array<ErrorSize, 7> bands = doubled_sizes<7>(0.01);
-  std::array<ErrorSize, 5> inks = doubled_sizes<5>(0.04);
+  double off_mm = 0.04;  ///< a print is off by this and more
+  std::array<ErrorSize, 7> bands = doubled_sizes<7>(off_mm / 4);
+  std::array<ErrorSize, 5> inks = doubled_sizes<5>(off_mm);
   /// Each size from off_mm on of prints that were seen to be the rig's, and each beyond a measured print's sigma.
   double fraction_of_known = 1e-4;
-  double off_mm = 0.04;      ///< a print is off by this and more
   double min_weight = 1e-6;  ///< of a size that counts
   /// Of the RCM: from the one on misprints are examined, too; from the other on it lies elsewhere.
   double clearly_missed_sigmas = 3, contradicted_sigmas = 5;

@@ -33,7 +33,8 @@ std::optional<PoseUnknowns> seen_at_depth(const PoseUnknowns& start, double scal
 }
 
 // Bits of the bands that may show at each place along a line of the marker.
-constexpr int places_along = 36;
+constexpr std::size_t beyond = 6;  // places beyond each end
+constexpr int places_along = surface_places - 2 * beyond;
 using BandsAlong = std::array<std::uint8_t, places_along>;
 
 BandsAlong bands_at(const Marker& marker, double tau_rad) {
@@ -70,7 +71,6 @@ double area_px2(const Scene& scene, const ShaftPose& pose) {
 }  // namespace
 
 double explained_area_px2(const Scene& scene, const ShaftPose& pose, bool turned, double above_px2) {
-  constexpr std::size_t beyond = 6;
   constexpr int lines = 9;
   constexpr double line_reach = 0.85;
   constexpr std::array beside_radii{1.08, 1.2};
@@ -92,8 +92,8 @@ double explained_area_px2(const Scene& scene, const ShaftPose& pose, bool turned
     const double azimuth_rad = visible_azimuth_rad(*view, line_reach, i, lines);
     if (turned) bands = bands_at(scene.marker, marker_azimuth_rad(scene.marker, azimuth_rad, pose.psi_rad));
     const Eigen::Vector3d base = point_on(pose, scene.marker, azimuth_rad, 0);
-    const LineInImage<places_along + 2 * beyond> line(scene, base - beyond * step, step);
-    for (std::size_t k = 0; k < places_along + 2 * beyond; ++k) {
+    const LineInImage<surface_places> line(scene, base - beyond * step, step);
+    for (std::size_t k = 0; k < surface_places; ++k) {
       // The bands that may show there; none beyond the marker's ends.
       const std::uint8_t here = k >= beyond && k < beyond + places_along ? bands[k - beyond] : 0;
       const std::uint8_t* const bgr = line.pixel(k, here != 0);

@@ -76,7 +76,7 @@ SidePoints measure_sides(const Scene& scene, const ShaftPose& pose, const Cylind
     };
     const Eigen::Vector2d left = silhouette(-1), right = silhouette(1), middle = (left + right) / 2;
     const double half_px = (right - left).norm() / 2;
-    if (!(half_px > 2) || half_px > 4000) continue;
+    if (!(half_px > 2 && std::isfinite(half_px))) continue;
     const Eigen::Vector2d across = (right - left) / (2 * half_px);
     const double step_px = std::max(1.0, half_px / half_samples);
     const int reach = static_cast<int>((half_px + reach_px) / step_px);
@@ -131,8 +131,7 @@ void add_curve_distance(const Scene& scene, const PoseUnknowns& unknowns, const 
   const double residual_px = normal.dot(measured_px - image.point_px);
   const Eigen::Vector3d pull = image.d_px_d_point.transpose() * normal;
   UnknownVector row = unknowns.row(point, pull);
-  const Eigen::Vector3d axis = unknowns.pose().camera_from_unrolled.rotation * Eigen::Vector3d::UnitZ();
-  row[psi_unknown] = psi_speed_m * pull.dot(axis);
+  row[psi_unknown] = psi_speed_m * pull.dot(axis_of(unknowns.pose()));
   equations.add(row, residual_px, robust_certainty(residual_px, sigma_px));
 }
 

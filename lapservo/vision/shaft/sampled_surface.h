@@ -53,8 +53,9 @@ class LineInImage {
   std::array<double, Count> u_px_, v_px_, depth_m_;
 };
 
-/// Lines side by side along a shaft, on which what it shows is looked at.
-inline constexpr int surface_lines = 13;
+/// Lines side by side along a shaft, on which what it shows is looked at; and at how many places of each, beyond the
+/// marker's ends as well, colours show how well a pose agrees with them.
+inline constexpr int surface_lines = 13, surface_places = 48;
 
 /// Colour classes along lines of a shaft's visible surface.
 template <std::size_t Samples>

@@ -16,7 +16,7 @@ namespace {
 constexpr double doubt_px = 3;         // of where the shaft and its colours lie
 constexpr double before_m = 0.3;       // of the marker, at most so much of the shaft
 constexpr double reach_lengths = 0.5;  // of the marker's length: nobody knows where the shaft ends
-constexpr double nearest_m = 0.01;     // to the camera
+constexpr double nearest_m = LensField::nearest_m;
 
 // A part of a shaft's axis as the image shows it, without the lens's distortion.
 struct Segment {
@@ -80,16 +80,15 @@ void ShaftCover::draw(const Camera& camera, const Marker& marker, const std::arr
     return point_on(pose, marker, view->facing_azimuth_rad + side * view->half_visible_rad, along_m);
   };
   const LensField field(camera);
-  const auto in_field = [&](const Eigen::Vector3d& point) { return point.z() > nearest_m && field.contains(point); };
-  constexpr double aside_m = 1e-4;
   const auto section_at = [&](double along_m) -> std::optional<Section> {
     const Eigen::Vector3d left = generatrix_at(-1, along_m), right = generatrix_at(1, along_m),
                           front = generatrix_at(0, along_m);
-    const Eigen::Vector3d axis = point_on_axis(pose, along_m), next = point_on_axis(pose, along_m + aside_m);
-    if (!in_field(left) || !in_field(right) || !in_field(front) || !in_field(next)) return std::nullopt;
+    const Eigen::Vector3d axis = point_on_axis(pose, along_m);
+    for (const Eigen::Vector3d& point : {left, right, front, axis})
+      if (!field.contains(point)) return std::nullopt;
     Section section{along_m, 0, axis.z(), camera.raw_from_point(left), camera.raw_from_point(right), {}};
     section.bulge_px = camera.raw_from_point(front) - (section.left_px + section.right_px) / 2;
-    section.px_per_m = (camera.ideal_from_point(next) - camera.ideal_from_point(axis)).norm() / aside_m;
+    section.px_per_m = px_per_m_along(camera, pose, axis);
     const Eigen::Vector2d out_px = doubt_px * (section.right_px - section.left_px).normalized();
     section.left_px -= out_px, section.right_px += out_px;
     return section;

@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 
+#include "lapservo/geometry/camera.h"
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/geometry/rigid3.h"
 #include "lapservo/kinematics/rcm_kinematics.h"
@@ -24,6 +25,15 @@ inline Eigen::Vector3d point_on_axis(const ShaftPose& pose, double along_m) {
 }
 inline Eigen::Vector3d point_on(const ShaftPose& pose, const Marker& marker, double azimuth_rad, double along_m) {
   return pose.camera_from_unrolled * surface_point(marker.radius_m(), azimuth_rad, along_m);
+}
+
+/// The direction of the axis in the camera's frame, to the tip; and how many pixels of the raw image a metre along it
+/// takes at a point of the shaft.
+inline Eigen::Vector3d axis_of(const ShaftPose& pose) {
+  return pose.camera_from_unrolled.rotation * Eigen::Vector3d::UnitZ();
+}
+inline double px_per_m_along(const Camera& camera, const ShaftPose& pose, const Eigen::Vector3d& point) {
+  return (camera.raw_with_jacobian(point).d_px_d_point * axis_of(pose)).norm();
 }
 
 /// Azimuth on the marker of the generatrix that faces the camera, [0, 2 pi). Nullopt for a camera inside of the shaft.
