@@ -65,6 +65,9 @@ LineSegmentation segment_line(std::span<const std::uint8_t> classes, const std::
     segmentation.position[state] = static_cast<double>(i);
     segmentation.seen[state] = supported(classes, i, state, bands);
   }
+  for (std::size_t band = 1; band <= bands.size(); ++band)
+    for (auto i = static_cast<std::size_t>(segmentation.position[band - 1]); i < segmentation.position[band]; ++i)
+      segmentation.score += rewards.of(classes[i])[band];
   return segmentation;
 }
 

@@ -11,10 +11,12 @@
 namespace lapservo::internal {
 
 /// The four colour boundaries along a line of colour classes: position[k] samples lie before boundary k, all of them
-/// before one that the line does not reach. `seen` when the samples on both its sides are what they should be.
+/// before one that the line does not reach. `seen` when the samples on both its sides are what they should be. `score`:
+/// the gain of the samples between the ends.
 struct LineSegmentation {
   std::array<double, 4> position{};
   std::array<bool, 4> seen{};
+  double score = 0;
 };
 
 /// The most likely split of the line into shaft, three bands and shaft, by dynamic programming over the five states:

@@ -36,12 +36,6 @@ struct RaysFromPole {
   }
 };
 
-// A line's split into the bands, and how well it agrees [samples].
-struct Line {
-  LineSegmentation split;
-  double score = 0;
-};
-
 // Lines side by side that one shaft may show on.
 struct Window {
   std::size_t middle = 0, first = 0, last = 0;  // lines
@@ -52,7 +46,7 @@ struct Window {
 struct Fan {
   RaysFromPole rays;
   double first_alpha_rad, step_alpha_rad, first_beta_rad, step_beta_rad;
-  std::vector<Line> lines{};
+  std::vector<LineSegmentation> lines{};
   std::vector<Window> windows{};  // best first
   double alpha_rad(double line) const { return first_alpha_rad + line * step_alpha_rad; }
   double beta_rad(double sample) const { return first_beta_rad + sample * step_beta_rad; }
@@ -115,26 +109,20 @@ std::uint8_t class_on_ray(const Scene& scene, const Eigen::Vector3d& ray) {
   return scene.field.contains(ray) ? scene.class_beside(scene.camera.raw_from_point(ray)) : Scene::outside;
 }
 
-Line line_at(const Scene& scene, const RaysFromPole& rays, double alpha_rad, const Samples& samples) {
+LineSegmentation line_at(const Scene& scene, const RaysFromPole& rays, double alpha_rad, const Samples& samples) {
   const Eigen::Vector3d across = rays.across(alpha_rad);
   std::array<std::uint8_t, line_samples> classes;
   for (std::size_t k = 0; k < line_samples; ++k)
     classes[k] = class_on_ray(scene, samples[k].x() * rays.pole + samples[k].y() * across);
-  Line line{segment_line(classes, scene.bands)};
-  std::size_t state = 0;
-  for (std::size_t k = 0; k < line_samples; ++k) {
-    while (state < 4 && static_cast<double>(k) >= line.split.position[state]) ++state;
-    if (state >= 1 && state <= 3) line.score += line_reward(state, classes[k], scene.bands);
-  }
-  return line;
+  return segment_line(classes, scene.bands);
 }
 
 // As wide as a marker is that looks as long as on the middle line.
 Window window_about(const Scene& scene, const Fan& fan, std::size_t middle) {
   Window window{middle};
-  const Line& line = fan.lines[middle];
-  const double length_rad = (line.split.position[3] - line.split.position[0]) * fan.step_beta_rad;
-  const double beta_rad = fan.beta_rad((line.split.position[0] + line.split.position[3]) / 2);
+  const LineSegmentation& line = fan.lines[middle];
+  const double length_rad = (line.position[3] - line.position[0]) * fan.step_beta_rad;
+  const double beta_rad = fan.beta_rad((line.position[0] + line.position[3]) / 2);
   const double half_rad = 0.8 * scene.marker.radius_m() / scene.marker.length_m() * length_rad;
   const auto half = static_cast<std::size_t>(half_rad / std::max(least_sine, std::sin(beta_rad)) / fan.step_alpha_rad);
   window.first = middle - std::min(middle, half), window.last = std::min(middle + half, fan.lines.size() - 1);
@@ -142,7 +130,7 @@ Window window_about(const Scene& scene, const Fan& fan, std::size_t middle) {
   return window;
 }
 
-double most_score(const std::vector<Line>& lines, const Window& window) {
+double most_score(const std::vector<LineSegmentation>& lines, const Window& window) {
   double most = 0;
   for (std::size_t i = window.first; i <= window.last; ++i) most = std::max(most, lines[i].score);
   return most;
@@ -151,7 +139,7 @@ double most_score(const std::vector<Line>& lines, const Window& window) {
 constexpr double least_share = 1.0 / 3;  // of the best line's score, for a line that shows the marker
 
 // A foreshortened marker is wider than by its length.
-Window grown(Window window, const std::vector<Line>& lines) {
+Window grown(Window window, const std::vector<LineSegmentation>& lines) {
   constexpr std::size_t most_apart = 3;
   const double least = least_share * most_score(lines, window);
   for (std::size_t i = window.first; i-- > 0 && window.first - i <= most_apart;)
@@ -208,7 +196,7 @@ bool is_hidden(const Scene& scene, const RaysFromPole& rays, double alpha_rad, d
 }
 
 Extent extent_of(const Scene& scene, const Fan& fan, const Window& window) {
-  const std::vector<Line>& lines = fan.lines;
+  const std::vector<LineSegmentation>& lines = fan.lines;
   const double most = most_score(lines, window);
   std::vector<double> first, last;
   double sum = 0, lowest = static_cast<double>(lines.size()), highest = 0;
@@ -217,18 +205,18 @@ Extent extent_of(const Scene& scene, const Fan& fan, const Window& window) {
     if (lines[i].score < least_share * most) continue;
     const auto place = static_cast<double>(i);
     sum += place, ++count, lowest = std::min(lowest, place), highest = std::max(highest, place);
-    const auto shares = shares_of(lines[i].split);
+    const auto shares = shares_of(lines[i]);
     with_other_bands += shares && !has_band_shares(scene.marker, *shares);
-    if (lines[i].split.seen[0]) first.push_back(fan.beta_rad(lines[i].split.position[0]));
-    if (lines[i].split.seen[3]) last.push_back(fan.beta_rad(lines[i].split.position[3]));
+    if (lines[i].seen[0]) first.push_back(fan.beta_rad(lines[i].position[0]));
+    if (lines[i].seen[3]) last.push_back(fan.beta_rad(lines[i].position[3]));
   }
   const auto agreed_end = [](std::vector<double>& places) {  // of two lines or more that show it
     return places.size() < 2 ? std::nullopt : std::optional(median(places));
   };
   Extent extent{fan.rays, fan.alpha_rad(sum / count), 0, agreed_end(first), agreed_end(last)};
   extent.other_bands = with_other_bands > (1 - few) * count;
-  const Line& middle = lines[window.middle];
-  const double from_rad = fan.beta_rad(middle.split.position[0]), to_rad = fan.beta_rad(middle.split.position[3]);
+  const LineSegmentation& middle = lines[window.middle];
+  const double from_rad = fan.beta_rad(middle.position[0]), to_rad = fan.beta_rad(middle.position[3]);
   extent.sine_of_beta = std::sin((from_rad + to_rad) / 2);
   extent.width_rad = (highest - lowest + 1) * fan.step_alpha_rad * extent.sine_of_beta;
   const double low_rad = fan.alpha_rad(lowest - 1), high_rad = fan.alpha_rad(highest + 1);
@@ -323,7 +311,7 @@ Eigen::Vector3d turned_pole(const Fan& fan) {
   for (const std::size_t end : {0, 3})
     for (std::size_t i = window.first; i <= window.last; ++i)
       for (std::size_t j = i + least_apart; j <= window.last; ++j) {
-        const LineSegmentation &a = fan.lines[i].split, &b = fan.lines[j].split;
+        const LineSegmentation &a = fan.lines[i], &b = fan.lines[j];
         if (a.seen[end] && b.seen[end])
           slopes.push_back((b.position[end] - a.position[end]) / static_cast<double>(j - i));
       }
