@@ -194,17 +194,18 @@ SeenBoundaries seen_in(const ChannelGeometry& channels, const PooledEdges& edges
   return seen;
 }
 
+Explanation<1> explained_by_response(const SeenBoundaries& seen, const Disagreement& all) {
+  return explained<1>(seen, all, believed.usual_exponent, believed.told_of_response_scatter,
+                      [](const SeenBoundary& boundary, int) { return boundary.by_exponent_px; });
+}
+
 // Specular light beside one boundary looks like another response there; a camera's shows without any one of them.
-bool is_at_more_than_one(const SeenBoundaries& seen, double exponent) {
-  return std::all_of(seen.begin(), seen.end(), [&](const SeenBoundary& left_out) {
-    double information = 1 / (believed.usual_exponent * believed.usual_exponent), gradient = 0;
-    for (const SeenBoundary& boundary : seen) {
-      if (&boundary == &left_out) continue;
-      const Channels apart = boundary.weight * boundary.apart(boundary.by_exponent_px);
-      information += (apart * boundary.by_exponent_px).sum();
-      gradient += (apart * boundary.offset_px).sum();
-    }
-    return gradient / information / exponent > believed.least_of_others;
+bool is_at_more_than_one(const SeenBoundaries& seen, const Disagreement& all, double exponent) {
+  return std::ranges::all_of(seen, [&](const SeenBoundary& left_out) {
+    SeenBoundaries others;
+    for (const SeenBoundary& boundary : seen)
+      if (&boundary != &left_out) others.push_back(boundary);
+    return explained_by_response(others, all).found[0] / exponent > believed.least_of_others;
   });
 }
 
@@ -252,11 +253,10 @@ std::optional<CameraDeparture> find_departure(const LightImage& light, std::span
   const Disagreement all(seen);
   if (!all.is_plain()) return std::nullopt;
   auto aberration = explained<2>(seen, all, believed.usual_aberration, believed.told_of_scatter, by_aberration_px);
-  const auto response = explained<1>(seen, all, believed.usual_exponent, believed.told_of_response_scatter,
-                                     [](const SeenBoundary& boundary, int) { return boundary.by_exponent_px; });
+  const auto response = explained_by_response(seen, all);
   if (response.scatter < std::min(aberration.scatter, believed.most_response_scatter) &&
       response.gain > believed.least_response_gain && std::abs(response.found[0]) > believed.least_exponent &&
-      is_at_more_than_one(seen, response.found[0]))
+      is_at_more_than_one(seen, all, response.found[0]))
     return by_exponent(seen, response);
   if (aberration.gain > believed.least_gain) return by_aberration(seen, aberration);
   if (!(aberration.gain > believed.least_doubted_gain && aberration.scatter < believed.most_doubted_scatter))
