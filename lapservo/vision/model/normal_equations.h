@@ -38,14 +38,14 @@ std::optional<UnknownMatrix> inverse_of(const UnknownMatrix& information);
 inline constexpr double cauchy_scale_sigmas = 2.5, inlier_sigmas = 5;
 
 /// Weight of a residual in units of its sigma under the Cauchy loss: 1 near zero, falling for outliers.
-inline double cauchy_weight(double residual_sigmas, double scale_sigmas) {
-  const double x = residual_sigmas / scale_sigmas;
+inline double cauchy_weight(double residual_sigmas) {
+  const double x = residual_sigmas / cauchy_scale_sigmas;
   return 1 / (1 + x * x);
 }
 
 /// 1 / sigma^2 of a residual, less of outliers.
 inline double robust_certainty(double residual, double sigma) {
-  return cauchy_weight(residual / sigma, cauchy_scale_sigmas) / (sigma * sigma);
+  return cauchy_weight(residual / sigma) / (sigma * sigma);
 }
 
 }  // namespace lapservo::internal

@@ -72,7 +72,7 @@ GroupPull gathered(const Products& products, std::size_t group, PrintEquations& 
 double certainty_of(const Measurement& m, const CommonErrors& errors) {
   const double sigmas = errors.lines[m.group].residual_px(m) / m.sigma_px,
                noise_px = errors.noise_scale(m) * m.sigma_px;
-  return cauchy_weight(sigmas, cauchy_scale_sigmas) / (noise_px * noise_px);
+  return cauchy_weight(sigmas) / (noise_px * noise_px);
 }
 
 // All boundaries moved alike, leaning alike, or bowed alike.
