@@ -69,15 +69,19 @@ struct Effort {
   int thinning;
 };
 
+/// Where edges were looked for.
+struct PlacesLookedAt {
+  int lines = 0;                  ///< generatrices
+  std::array<int, 4> in_image{};  ///< of them, lines on which the boundary lies inside the image and off the seam
+  int sides_in_image = 0;         ///< stations on which a side lies inside the image and off the boundaries
+};
+
 /// Everything that a frame shows of a marker's boundaries and of its shaft's sides near a pose.
-struct EdgeMeasurements {
+struct EdgeMeasurements : PlacesLookedAt {
   static constexpr int max_lines = max_end_points, max_stations = 24;
   static constexpr std::size_t most = 4 * max_lines + 2 * max_stations;
   InplaceVector<Measurement, most> all;
-  std::array<int, 4> in_image{};  ///< lines on which the boundary lies inside the image and off the seam
-  int sides_in_image = 0;         ///< stations on which a side lies inside the image and off the boundaries
-  int lines = 0;                  ///< generatrices looked at
-  double radius_px = 0;           ///< the shaft's
+  double radius_px = 0;  ///< the shaft's
   EllipseEvidence ellipse;
   BlurEvidence side_blur;
 

@@ -92,9 +92,7 @@ class Fitter {
     return true;
   }
   void judge(const Expected& expected) {
-    fit_.lines = pass_.lines;
-    fit_.in_image = pass_.in_image;
-    fit_.sides_in_image = pass_.sides_in_image;
+    static_cast<PlacesLookedAt&>(fit_) = pass_;
     const auto tau_rad = facing_tau_rad(scene_.marker, fit_.unknowns.pose());
     const bool is_known = tau_rad && scene_.known_sides[print_side(*tau_rad)];
     count_inliers();

@@ -29,20 +29,17 @@ struct FineFitLimits {
 };
 inline constexpr FineFitLimits fine_fit_limits;
 
-struct FineFit : PrintVerdict {
+struct FineFit : PrintVerdict, PlacesLookedAt {
   bool converged = false;
   PoseUnknowns unknowns;
   PoseUnknowns as_the_rig_says;  ///< the pose, were the print exactly so
   /// Covariance of the unknowns with the registration's numbers (RcmPrior).
   Eigen::Matrix<double, pose_unknowns, 6> with_registration = Eigen::Matrix<double, pose_unknowns, 6>::Zero();
   EdgeBlur blur;
-  int lines = 0;                  ///< generatrices looked at
-  std::array<int, 4> used{};      ///< of them, lines on which the boundary was located and agrees with the fit
-  std::array<int, 4> in_image{};  ///< lines on which the boundary lies inside the image and off the seam
-  int sides_in_image = 0;         ///< places at which the shaft's sides were looked for
-  int sides_used = 0;             ///< of them, those at which the side was located and agrees with the fit
-  double inlier_rms_sigmas = 0;   ///< of the boundaries' residuals, print errors taken out, by noise and tolerated_px
-  bool asked = false;             ///< what the camera did to the image
+  std::array<int, 4> used{};     ///< of the lines, those on which the boundary was located and agrees with the fit
+  int sides_used = 0;            ///< of the stations, those at which the side was located and agrees with the fit
+  double inlier_rms_sigmas = 0;  ///< of the boundaries' residuals, print errors taken out, by noise and tolerated_px
+  bool asked = false;            ///< what the camera did to the image
   Processing processing = Processing::unknown;  ///< as far as wanted
   int processing_explained = 0;                 ///< how often ProcessingEvidence::explained
   int asked_for_departure = 0;                  ///< how often find_departure() was
