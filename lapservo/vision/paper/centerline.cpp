@@ -234,21 +234,24 @@ Edges moved(Edges edges, const EdgesVector& error) {
   return edges;
 }
 
-std::optional<Observation> observe_edges(const Camera& camera, const Instrument& instrument,
-                                         const CrossRatioDecoder& decoder, const Edges& edges) {
-  Observation o;
-  o.status = Status::ok;
+// Status::ok, or what is refused of the edges.
+Observation observe_edges(const Camera& camera, const Instrument& instrument, const CrossRatioDecoder& decoder,
+                          const Edges& edges) {
+  Observation o, refused;
+  o.status = Status::ok, refused.status = Status::poor_fit;
+  refused.refused.what = Observation::Refused::What::edges;
   o.edges_ideal_px = edges;
   for (const EdgesVector& error : errors_of(edges, boundary_sigma_px))
     o.edges_covariance_px2 += error * error.transpose();
-  for (std::size_t k = 0; k < 4; ++k) o.edges_raw_px[k] = camera.raw_from_ideal(edges[k]);
+  for (std::size_t k = 0; k < 4; ++k)
+    o.edges_raw_px[k] = refused.refused.edges_raw_px[k] = camera.raw_from_ideal(edges[k]);
   const Marker& marker = instrument.marker;
   const auto& camera_from_rcm = instrument.camera_from_rcm;
   o.features = features_of(edges, camera_from_rcm ? projected_rcm_px(camera, *camera_from_rcm) : std::nullopt);
   const double room = 0.1 * (decoder.highest_cross_ratio() - decoder.lowest_cross_ratio());
   if (o.features.cross_ratio < decoder.lowest_cross_ratio() - room ||
       o.features.cross_ratio > decoder.highest_cross_ratio() + room)
-    return std::nullopt;
+    return refused;
   o.tau_rad = decoder.tau_rad(o.features.cross_ratio);
   const double print_px = marker.boundary_sigma_m() * o.features.l_px / marker.length_m();
   const auto errors = errors_of(edges, std::hypot(boundary_sigma_px, print_px));
@@ -270,13 +273,13 @@ std::optional<Observation> observe_edges(const Camera& camera, const Instrument&
     return o;
   }
   const auto q = configuration_from(camera, marker, *camera_from_rcm, edges, o.tau_rad);
-  if (!q) return std::nullopt;
+  if (!q) return refused;
   Observation::Rcm rcm{*q, Eigen::Matrix4d::Zero()};
   for (const EdgesVector& error : errors) {
     const Edges changed = moved(edges, error);
     const double tau_rad = decoder.tau_rad(ratio_of(changed));
     const auto other = configuration_from(camera, marker, *camera_from_rcm, changed, tau_rad);
-    if (!other) return std::nullopt;
+    if (!other) return refused;
     const Eigen::Vector4d change = configuration_change(*q, *other);
     rcm.covariance += change * change.transpose();
   }
@@ -312,17 +315,9 @@ std::vector<Observation> CenterlineMethod::observe(const cv::Mat& image_bgr) con
       BandMasks inside;
       for (std::size_t band = 0; band < 3; ++band) inside[band] = masks[band] & region.pixels;
       const auto edges = boundaries_on(*line, rig_.camera, inside);
-      const auto observation =
-          edges ? observe_edges(rig_.camera, rig_.instruments[i], decoders_[i], *edges) : std::nullopt;
-      if (!observation) {
-        observations[i].status = Status::poor_fit;
-        Observation::Refused& refused = observations[i].refused;
-        if (edges) refused.what = Observation::Refused::What::edges;
-        for (std::size_t k = 0; edges && k < 4; ++k) refused.edges_raw_px[k] = rig_.camera.raw_from_ideal((*edges)[k]);
-        continue;
-      }
-      observations[i] = *observation;
-      break;
+      observations[i].status = Status::poor_fit;
+      if (edges) observations[i] = observe_edges(rig_.camera, rig_.instruments[i], decoders_[i], *edges);
+      if (observations[i].status == Status::ok) break;
     }
   }
   return observations;
