@@ -52,8 +52,7 @@ class LookSchedule {
   void passed() { frames_left_ = std::max(0, frames_left_ - 1); }
 
  private:
-  static constexpr int after_none = FrameClock::frames_a_second / 2 - 1,
-                       longest_pause = 2 * FrameClock::frames_a_second;
+  static constexpr int after_none = 15, longest_pause = 2 * FrameClock::frames_a_second;
   int frames_left_ = 0, pause_ = 1;
 };
 
