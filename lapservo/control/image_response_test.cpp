@@ -159,6 +159,32 @@ TEST_P(Unanswered, AJointThatTheInstrumentDoesNotFollowIsNamed) {
     }
 }
 
+// A moved endoscope is suspected again and again, each time for too short a time to show the fault in between.
+TEST(ImageResponse, SuspicionsThatEndByThemselvesHideNoFault) {
+  for (Eigen::Index joint = 0; joint < 4; ++joint) {
+    SCOPED_TRACE(joint);
+    const Fault fault{.name = "", .joint = joint, .answer = -1};
+    const Flaws flaws = flaws_of(fault, 1);
+    const ControllerConfig config = config_of(ControlMode::fused, flaws);
+    const TestRig rig;
+    Random random(1);
+    const Eigen::Vector4d start = testing::random_start(rig, config, flaws, random);
+    VisualController controller(config, testing::model_of(rig));
+    TestSimulator simulator(rig, flaws, start, 1);
+    const Trajectory goal = trajectory_of(Goal::far, start);
+    std::vector<Moment> moments;
+    for (int k = 0; k < 20; ++k) {
+      for (const Moment& moment : simulator.run(controller, goal, 0.25)) moments.push_back(moment);
+      controller.suspend(HoldReason::endoscope_moved);
+      for (const Moment& moment : simulator.run(controller, goal, 0.1)) moments.push_back(moment);
+      controller.resume();
+    }
+    const Outcome outcome = outcome_of(fault, moments);
+    EXPECT_TRUE(outcome.named);
+    EXPECT_LE(outcome.path, 1.001);
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Modes, Unanswered,
                          ::testing::Values(ControlMode::fused, ControlMode::paper, ControlMode::uncalibrated),
                          [](const auto& mode) { return std::string(to_string(mode.param)); });

@@ -1,5 +1,6 @@
 #include "lapservo/control/visual_controller.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -78,6 +79,7 @@ void VisualController::restart_tests() {
 void VisualController::resume(const FeatureModel& model) {
   resume();
   image_response_.interrupt();
+  error_growth_.restart();
   estimator_->set_model(model);
   image_reason_ = HoldReason::no_image_yet;
 }
@@ -116,9 +118,10 @@ ControlStep VisualController::step(double time_s, const Eigen::Vector4d& q_joint
   if (step.estimate && all_finite(desired)) step.error = feature_error(step.estimate->features, desired.features);
   step.delay_s = delay_s();
   step.delay_is_known = delay_is_known();
-  if (!follows_ || step.action != ControlAction::track || !step.estimate) {
+  const bool tracks = step.action == ControlAction::track && step.estimate;
+  if (!follows_ || (!tracks && suspended_ == HoldReason::none)) {
     error_growth_.restart();
-  } else if (error_growth_.add(desired, step.error)) {
+  } else if (tracks && error_growth_.add(desired, step.error)) {
     until_start_ = HoldReason::error_grows;
   }
   return step;
@@ -133,8 +136,13 @@ HoldReason VisualController::read(double time_s, const Eigen::Vector4d& q_joint,
   now_s_ = time_s;
   if (!q_joint.allFinite()) return HoldReason::non_finite;
   if (!started_) reset(time_s, q_joint);
-  const WildJoints::Verdict verdict = wild_joints_.validate(time_s, q_joint);
-  if (verdict == WildJoints::Verdict::wild) return HoldReason::wild_joints;
+  auto verdict = joints_are_wild_ ? WildJoints::Verdict::wild : WildJoints::Verdict::plausible;
+  // A tick without a new reading does not show how fast a joint goes.
+  if (!has_readings_ || !readings.empty() || q_joint != q_read_)
+    verdict = wild_joints_.validate(readings.empty() ? time_s : std::min(time_s, readings.back().time_s), q_joint);
+  q_read_ = q_joint;
+  joints_are_wild_ = verdict == WildJoints::Verdict::wild;
+  if (joints_are_wild_) return HoldReason::wild_joints;
   if (verdict == WildJoints::Verdict::jumped) {
     history_.clear();
     estimator_->interrupt();
@@ -176,12 +184,13 @@ HoldReason VisualController::update(const ImageMeasurement& image) {
   if (image.time_s - now_s_ > most_ahead_s) return HoldReason::bad_time;
   // A repeated or older stamp carries no information: the age of the last measurement goes on growing.
   if (image_s_ && image.time_s <= *image_s_) return image_reason_;
+  // Of images that a pause kept back the stamps of arrival are late.
+  if (image_s_ && image.time_s - *image_s_ > config_.stale_after_s) images_from_s_ = image.time_s;
   image_s_ = image.time_s;
   constexpr double compared_s = 0.3;
-  if (history_.pauses(image.time_s - compared_s, image.time_s)) {
-    frozen_image_ = FrozenImage(config_.scales);
-    image_response_.interrupt();
-  }
+  const bool joints_pause = history_.pauses(image.time_s - compared_s, image.time_s);
+  if (joints_pause) frozen_image_ = FrozenImage(config_.scales);
+  if (joints_pause || (images_from_s_ && image.time_s - *images_from_s_ < compared_s)) image_response_.interrupt();
   const FrozenImage::Verdict verdict = frozen_image_.add(image, history_);
   if (verdict == FrozenImage::Verdict::frozen) return HoldReason::frozen_image;
   if (verdict == FrozenImage::Verdict::again) return image_reason_;
@@ -194,7 +203,7 @@ HoldReason VisualController::update(const ImageMeasurement& image) {
     usable_s_ = now_s_;
   }
   if (reason == HoldReason::delay_not_found) until_start_ = reason;
-  if (suspended) image_response_.interrupt();
+  // A suspicion that ends by itself ends no path over which the image has to answer.
   if (suspended || reason == HoldReason::outlier) return reason;
   if (const auto found = estimator_->unanswered()) image_response_.set_unanswered(*found);
   if (const auto now = estimator_->at(now_s_, *history_.newest())) image_response_.add(image, now->jacobian, history_);

@@ -134,11 +134,14 @@ class VisualController {
   HoldReason suspended_ = HoldReason::none;
   bool started_ = false;
   bool follows_ = true;
+  Eigen::Vector4d q_read_ = Eigen::Vector4d::Zero();  ///< of the latest tick
+  bool joints_are_wild_ = false;
   bool measured_ = false;      ///< the joints of this tick are plausible
   bool has_readings_ = false;  ///< between ticks
   double now_s_ = 0;
   HoldReason image_reason_ = HoldReason::no_image_yet;  ///< of the latest image
   std::optional<double> image_s_;                       ///< stamp of the latest image
+  std::optional<double> images_from_s_;                 ///< of the first one after a pause
   double usable_s_ = 0;                                 ///< when the last usable one arrived
   bool stale_ = false;                                  ///< it is too old
   SlowImages slow_images_;

@@ -398,6 +398,22 @@ TEST(VisualController, KeepsReadingsThatComeATickLate) {
   }
 }
 
+TEST(VisualController, ATickWithoutAReadingMakesTheNextOneNoJump) {
+  const ControllerConfig config = testing::test_config({});
+  VisualController controller(config, testing::model_of({}));
+  controller.expect_following(false);
+  Eigen::Vector4d measured;
+  for (int k = 0; k < 60; ++k) {
+    const double time_s = k * config.period_s;
+    std::vector<JointReading> readings;
+    if (k % 5 != 4) {
+      measured = Eigen::Vector4d(-0.2, 1.4, 0.05, -0.5) + 0.95 * time_s * config.limits.rate;
+      readings.push_back({time_s, JointVector::from_vector(measured)});
+    }
+    EXPECT_NE(controller.step(time_s, measured, {}, {}, readings).reason, HoldReason::wild_joints) << time_s;
+  }
+}
+
 // The arm stands, and so does an image without noise, once the measured joints reach back to before it.
 TEST(VisualController, JointsThatWereSetFreezeNoPicture) {
   const ControllerConfig config = testing::test_config({});
@@ -439,6 +455,24 @@ TEST(VisualController, APauseOfTheJointsFreezesNoPicture) {
     }
     const auto image = testing::image_of(model(q_at(image_s)).value(), image_s);
     EXPECT_NE(controller.step(time_s, measured, image, desired, readings).reason, HoldReason::frozen_image) << time_s;
+  }
+}
+
+// The first image after a pause was taken before it, and has the stamp of its arrival.
+TEST(VisualController, AnImageThatAPauseKeptBackIsNoFault) {
+  constexpr double from_s = 5;
+  for (const double pause_s : {0.3, 0.4, 0.6}) {
+    Flaws flaws = usual_flaws();
+    const double to_s = from_s + pause_s;
+    flaws.spoil = [=](ImageMeasurement image) {
+      if (image.time_s > from_s && image.time_s < to_s) image.time_s = to_s;
+      return image;
+    };
+    flaws.lost = [=, &flaws](double t) { return t + flaws.latency_s > from_s + 0.02 && t + flaws.latency_s < to_s; };
+    Sinusoids fast = paper_sinusoids();
+    fast.omega_rad_s.setConstant(1);
+    for (const Moment& m : run(flaws, sinusoids(fast), to_s + 2, 1))
+      EXPECT_NE(m.step.reason, HoldReason::image_not_following) << pause_s << ' ' << m.time_s;
   }
 }
 
