@@ -55,8 +55,9 @@ void DelayEstimator::add(double stamp_s, const Eigen::Vector4d& q_image, const E
 // The square of the delay's error by a wrong model, where it shows: each joint's place in the image may be off by a
 // multiple of each joint's. The estimator keeps sums of squares and products, not frames: each matrix that has the same
 // products gives the same fit.
-double DelayEstimator::variance_by_model(std::size_t candidate, double shift_s) const {
+double DelayEstimator::variance_by_model(const Lowest& at) const {
   constexpr Eigen::Index faults = 16, all = faults + 2;
+  const auto [candidate, shift_s, delay_s, by_noise_s2] = at;
   const Candidate &left = grid_[candidate - 1], &centre = grid_[candidate], &right = grid_[candidate + 1];
   const double curvature = (left.squares - 2 * centre.squares + right.squares) / (step_s * step_s);
   const Eigen::Matrix4d by_delay = (right.mixed - left.mixed) / (2 * step_s), mixed = centre.mixed + shift_s * by_delay;
@@ -76,7 +77,7 @@ double DelayEstimator::variance_by_model(std::size_t candidate, double shift_s) 
   return departures.by_seen(0, 0) + departures.by_instead(0, 0);
 }
 
-std::optional<DelayEstimate> DelayEstimator::estimate() const {
+std::optional<DelayEstimator::Lowest> DelayEstimator::lowest() const {
   if (seen_s_ < config_.min_time_s) return std::nullopt;
   const auto lowest = likeliest(grid_);
   const auto index = static_cast<std::size_t>(lowest - grid_.begin());
@@ -89,12 +90,25 @@ std::optional<DelayEstimate> DelayEstimator::estimate() const {
   // A sum of squares grows by 1 at one sigma. A residual that the measured joints do not explain counts as noise that
   // persists over several frames.
   const double misfit = std::max(1.0, lowest->squares / (4 * weight_));
-  const double by_noise_s2 = 2 / curvature * misfit * frames_alike;
+  return Lowest{middle, shift_s, delay_s, 2 / curvature * misfit * frames_alike};
+}
+
+std::optional<DelayEstimate> DelayEstimator::estimate() const {
+  const auto found = lowest();
   // A wrong model only adds to it, and costs a factorisation to ask.
-  if (!(by_noise_s2 <= config_.max_sigma_s * config_.max_sigma_s)) return std::nullopt;
-  const double sigma_s = std::sqrt(by_noise_s2 + variance_by_model(middle, shift_s));
+  if (!found || !(found->by_noise_s2 <= config_.max_sigma_s * config_.max_sigma_s)) return std::nullopt;
+  const double sigma_s = std::sqrt(found->by_noise_s2 + variance_by_model(*found));
   if (!(sigma_s <= config_.max_sigma_s)) return std::nullopt;
-  return DelayEstimate{delay_s, sigma_s};
+  return DelayEstimate{found->delay_s, sigma_s};
+}
+
+bool DelayEstimator::contradicts(double delay_s) const {
+  constexpr double sure = 4;
+  const auto found = lowest();
+  if (!found) return false;
+  const double apart_s = std::abs(found->delay_s - delay_s), sure_s2 = std::pow(apart_s / sure, 2);
+  return apart_s > sure * config_.max_sigma_s && found->by_noise_s2 < sure_s2 &&
+         found->by_noise_s2 + variance_by_model(*found) < sure_s2;
 }
 
 bool DelayEstimator::is_contradicted() const {

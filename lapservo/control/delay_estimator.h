@@ -40,6 +40,9 @@ class DelayEstimator {
   /// The image stamped t shows the joints at t - delay.
   std::optional<DelayEstimate> estimate() const;
 
+  /// Another delay than this one explains the images better, beyond doubt and by more than an estimate may err.
+  bool contradicts(double delay_s) const;
+
   /// No delay makes images and joints agree, although the joints' motion would determine it several times over.
   bool is_contradicted() const;
 
@@ -49,8 +52,14 @@ class DelayEstimator {
     double squares = 0;
     Eigen::Matrix4d mixed = Eigen::Matrix4d::Zero();  ///< the weighted rest by where the joints are
   };
-  /// At the lowest sum of squares, between its candidate and a neighbour.
-  double variance_by_model(std::size_t candidate, double shift_s) const;
+  /// The lowest sum of squares, between its candidate and a neighbour, and its variance by noise.
+  struct Lowest {
+    std::size_t candidate;
+    double shift_s, delay_s, by_noise_s2;
+  };
+  /// nullopt before min_time_s, and where all delays are alike.
+  std::optional<Lowest> lowest() const;
+  double variance_by_model(const Lowest& at) const;
 
   DelayEstimatorConfig config_;
   std::array<Candidate, candidates> grid_;

@@ -32,6 +32,13 @@ Eigen::Vector4d instrument(const std::array<Backlash, 4>& backlashes, const Eige
   return q;
 }
 
+// Of the last seconds: whether the delay is still the one that all images gave.
+DelayEstimatorConfig of_the_newest(DelayEstimatorConfig config) {
+  constexpr double part = 0.15;
+  config.forgetting_s *= part;
+  return config;
+}
+
 /// How the measured joints changed before `time_s`, per second.
 Eigen::Vector4d rate_before(const JointHistory& history, double time_s, const Eigen::Vector4d& q) {
   constexpr double span_s = 0.05;  // long enough for the measured joints' resolution
@@ -40,6 +47,15 @@ Eigen::Vector4d rate_before(const JointHistory& history, double time_s, const Ei
 }
 
 }  // namespace
+
+OffsetObserver::OffsetObserver(const ObserverConfig& config, const Scales& scales, FeatureModel model)
+    : model_(std::move(model)),
+      config_(config),
+      scales_(scales),
+      delay_estimator_(config.delay_estimator),
+      newest_delay_(of_the_newest(config.delay_estimator)),
+      backlash_estimator_(config.backlash, scales),
+      delay_s_(config.delay_s.value_or(config.initial_delay_s)) {}
 
 Eigen::Vector4d OffsetObserver::walk_variance(double interval_s, const Eigen::Vector4d& moved) const {
   const double distance = moved.cwiseQuotient(scales_.joints).norm();
@@ -98,7 +114,9 @@ HoldReason OffsetObserver::use(const ImageMeasurement& image, const JointHistory
   ends_offset_px_ +=
       -std::expm1(-config_.bandwidth_rad_s * interval_s) * (image.ends_px - state->ends_px - ends_offset_px_);
   const Eigen::Vector4d seen_offset = offset_ + innovation - gain * innovation;
-  if (!config_.delay_s) delay_estimator_.add(image.time_s, *q_then + seen_offset, seen_noise, history);
+  if (!config_.delay_s)
+    for (DelayEstimator* estimator : {&delay_estimator_, &newest_delay_})
+      estimator->add(image.time_s, *q_then + seen_offset, seen_noise, history);
   if (delay_is_right()) {
     backlash_estimator_.add(image.time_s, rate_before(history, image.time_s - delay_s_, *q_then),
                             q_driven_then + seen_offset, seen_noise);
@@ -158,6 +176,7 @@ HoldReason OffsetObserver::start(const Eigen::Vector4d& q_driven_then, const Ima
 void OffsetObserver::interrupt() {
   backlash_estimator_.interrupt();
   delay_estimator_.interrupt();
+  newest_delay_.interrupt();
 }
 
 bool OffsetObserver::agrees_with_last_outlier(const Eigen::Vector4d& seen_offset,
@@ -175,11 +194,19 @@ Eigen::Vector4d OffsetObserver::within_limits(const Eigen::Vector4d& offset) con
 
 void OffsetObserver::follow_delay(double interval_s) {
   if (config_.delay_s) return;
+  if (delay_seen_ && newest_delay_.contradicts(delay_s_)) forget_delay();
   const auto seen = delay_estimator_.estimate();
   if (!seen) return;
   constexpr double fastest = 0.1;  // seconds of delay per second, so that the prediction does not jump
   delay_s_ += std::clamp(seen->delay_s - delay_s_, -fastest * interval_s, fastest * interval_s);
   delay_seen_ = delay_seen_ || delay_is_right();
+}
+
+// It is a guess until it is found anew.
+void OffsetObserver::forget_delay() {
+  delay_estimator_ = DelayEstimator(config_.delay_estimator);
+  newest_delay_ = DelayEstimator(of_the_newest(config_.delay_estimator));
+  delay_seen_ = false;
 }
 
 bool OffsetObserver::delay_is_right() const {

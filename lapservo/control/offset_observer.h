@@ -28,13 +28,7 @@ namespace lapservo::internal {
 /// below 1 / delay when they have positive real parts.
 class OffsetObserver : public Estimator {
  public:
-  OffsetObserver(const ObserverConfig& config, const Scales& scales, FeatureModel model)
-      : model_(std::move(model)),
-        config_(config),
-        scales_(scales),
-        delay_estimator_(config.delay_estimator),
-        backlash_estimator_(config.backlash, scales),
-        delay_s_(config.delay_s.value_or(config.initial_delay_s)) {}
+  OffsetObserver(const ObserverConfig& config, const Scales& scales, FeatureModel model);
 
   /// The first image, and the last of several outliers that agree, start the offset anew. Others are ignored: outlier,
   /// no_history, not_modelled, non_finite, psi_contradicted. delay_not_found: ample motion did not give the delay.
@@ -48,10 +42,10 @@ class OffsetObserver : public Estimator {
   void interrupt() override;
   /// Looks for the delay anew where images and joints agreed at none.
   void restart_tests() override {
-    if (delay_is_contradicted()) delay_estimator_ = DelayEstimator(config_.delay_estimator);
+    if (delay_is_contradicted()) forget_delay();
   }
   double delay_s() const override { return delay_s_; }
-  /// Given, or estimated once.
+  /// Given, or estimated, and the newest images agree with it.
   bool delay_is_known() const override { return config_.delay_s || delay_seen_; }
   const Eigen::Vector4d& offset() const { return offset_; }
   /// Full backlash between measured joints and instrument, joint by joint, as far as it has been learnt.
@@ -65,6 +59,7 @@ class OffsetObserver : public Estimator {
   bool agrees_with_last_outlier(const Eigen::Vector4d& seen_offset, const Eigen::Matrix4d& innovation_covariance);
   Eigen::Vector4d within_limits(const Eigen::Vector4d& offset) const;
   void follow_delay(double interval_s);
+  void forget_delay();
   void follow_measured(const JointHistory& history, double time_s, const Eigen::Vector4d& q_then);
   void follow_backlash(double interval_s);
   bool delay_is_right() const;
@@ -74,7 +69,7 @@ class OffsetObserver : public Estimator {
   FeatureModel model_;
   ObserverConfig config_;
   Scales scales_;
-  DelayEstimator delay_estimator_;
+  DelayEstimator delay_estimator_, newest_delay_;
   BacklashEstimator backlash_estimator_;
   Eigen::Vector4d backlash_ = Eigen::Vector4d::Zero();
   Backlashes backlashes_then_, backlashes_;  ///< at the last image, at the last reading before it came

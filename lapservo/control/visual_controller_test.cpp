@@ -476,6 +476,26 @@ TEST(VisualController, AnImageThatAPauseKeptBackIsNoFault) {
   }
 }
 
+// Another buffer, or another way through the network.
+TEST(VisualController, ADelayThatChangesIsForgottenAndFoundAnew) {
+  constexpr double at_s = 12, noticed_s = 5, found_s = 8;
+  for (const auto& [before_s, after_s] : {std::pair(0.05, 0.2), {0.2, 0.05}, {0.08, 0.13}}) {
+    SCOPED_TRACE(after_s);
+    Flaws flaws = usual_flaws();
+    flaws.delay_known = false, flaws.latency_s = before_s;
+    flaws.spoil = [=, changed_s = after_s - before_s](ImageMeasurement image) {
+      if (image.time_s > at_s) image.time_s += changed_s;
+      return image;
+    };
+    for (const Moment& m : run(flaws, sinusoids(paper_sinusoids()), at_s + found_s + 4, 1)) {
+      const bool is_right = std::abs(m.step.delay_s - after_s) < 0.02, is_known = m.step.delay_is_known;
+      EXPECT_TRUE(is_known || m.time_s < at_s - 2 || m.time_s > at_s) << m.time_s;
+      EXPECT_TRUE(is_right || !is_known || m.time_s < at_s + noticed_s) << m.time_s << ": " << m.step.delay_s;
+      EXPECT_TRUE((is_right && is_known) || m.time_s < at_s + found_s) << m.time_s << ": " << m.step.delay_s;
+    }
+  }
+}
+
 class Holding : public ::testing::TestWithParam<ControlMode> {
  protected:
   ControllerConfig config_for(const Flaws& flaws) const {
