@@ -145,24 +145,36 @@ Found SurfaceTracker::follow_known(const ImageView& image, const LightImage& lig
   return found;
 }
 
+// Whether it is not found, or misses the well known RCM: another one may pass through that.
+bool SurfaceTracker::is_lost(const Tracked& it) {
+  const std::optional<RcmPrior>& rcm = it.registration;
+  return !it.found.fit ||
+         (rcm && rcm->is_within(it.instrument.marker.radius_m()) && !it.found.fit->unknowns.through_rcm());
+}
+
 // Whether some were found.
 bool SurfaceTracker::look_for_lost(const ImageView& image, const LightImage& light, const std::vector<Blob>& blobs,
                                    WorkBudget& budget, bool again) {
-  auto lost = std::ranges::count_if(tracked_, [](const Tracked& it) { return !it.found.fit; });
+  auto lost = std::ranges::count_if(tracked_, is_lost);
   bool any = false;
   for (Tracked& it : tracked_) {
-    if (it.found.fit) continue;
+    if (!is_lost(it)) continue;
     cover_found(it, blobs, budget);
-    if (again && others_ == it.beside) continue;
-    if (others_ != it.beside) it.search = MarkerSearch(), it.beside = others_;
+    const bool misses_rcm = it.found.fit.has_value();
+    if (!misses_rcm && again && others_ == it.beside) continue;
+    if (!misses_rcm && others_ != it.beside) it.search = MarkerSearch(), it.beside = others_;
     // Who was followed in vain, or took twice the work for it, has all of the next frame.
     const auto beyond = next_frame_ ? WorkBudget::Beyond::none : WorkBudget::Beyond::first;
     const double units = budget.left() / static_cast<double>(lost--) * (others_.empty() ? 1 : search_costs.part_beside);
     const std::vector<Blob> parts = others_.empty() ? std::vector<Blob>() : without(blobs, others_);
-    it.found = budget.share(units, beyond, [&](WorkBudget& part) {
-      return it.search.look({scene_of(image, it), light, others_.empty() ? blobs : parts}, part);
+    Found found = budget.share(units, beyond, [&](WorkBudget& part) {
+      const SearchFrame frame{scene_of(image, it), light, others_.empty() ? blobs : parts};
+      return misses_rcm ? it.search.look_beside(it.found.fit->unknowns, frame, part) : it.search.look(frame, part);
     });
-    any |= it.found.fit.has_value();
+    any |= found.fit.has_value();
+    if (misses_rcm && !found.fit) continue;
+    if (misses_rcm) it.memory.reset(), it.seen_before = {}, it.cover.clear(), it.beside = others_;
+    it.found = std::move(found);
   }
   return any;
 }
@@ -171,16 +183,16 @@ bool SurfaceTracker::look_for_lost(const ImageView& image, const LightImage& lig
 // again beside those that were found after them: else the next frame does that.
 void SurfaceTracker::find(const ImageView& image, const LightImage& light, WorkBudget& budget) {
   for (Tracked& it : tracked_) it.cover.clear(), it.found = {};  // all, before one is followed beside the others
-  bool lost = next_frame_ = false;
+  next_frame_ = false;
   for (Tracked& it : tracked_)
     if (it.memory) it.found = follow_known(image, light, it, budget);
   fit_behind(image, light, budget);
   for (Tracked& it : tracked_) {
     if (it.found.fit) continue;
-    lost = true, next_frame_ |= it.memory.has_value();
+    next_frame_ |= it.memory.has_value();
     it.memory.reset(), it.cover.clear();
   }
-  if (!lost) return;
+  if (std::ranges::none_of(tracked_, is_lost)) return;
   budget.spend(search_costs.blobs_per_px * image.width_px * image.height_px);
   const std::vector<Blob> blobs = largest_blobs(image, classes_);
   bool more = true;

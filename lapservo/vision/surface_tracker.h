@@ -23,6 +23,7 @@ namespace lapservo::internal {
 ///
 /// A shaft is held at the RCM as well as the registration knows it. Where the image contradicts that, the shaft is
 /// fitted without it: the image features are right then, and q is given only as far as the mismatch lets it be known.
+/// Another one that passes through the RCM is looked for meanwhile, and counts instead.
 class SurfaceTracker {
  public:
   /// The options `single`, `frame_budget` and `max_p_false` count.
@@ -57,6 +58,7 @@ class SurfaceTracker {
   };
   void find(const ImageView& image, const LightImage& light, WorkBudget& budget);
   Found follow_known(const ImageView& image, const LightImage& light, Tracked& known, WorkBudget& budget);
+  static bool is_lost(const Tracked& it);
   bool look_for_lost(const ImageView& image, const LightImage& light, const std::vector<Blob>& blobs,
                      WorkBudget& budget, bool again);
   bool cover_expected(const Tracked& known, WorkBudget& budget, bool only_before = false);

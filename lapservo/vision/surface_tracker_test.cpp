@@ -273,6 +273,27 @@ TEST(SurfaceTracker, TwoOfTheSamePrintStayAmbiguousWithinAnyBudget) {
   EXPECT_GE(candidates, 30) << "the test's own power";
 }
 
+// Nor does a marker that was found while the instrument's was hidden stay when that, which passes the RCM, shows again.
+TEST(SurfaceTracker, OfTwoOfTheSamePrintTheOneThroughTheRcmCounts) {
+  Rig both = scenes::usual_rig(2), other = both;
+  both.instruments[1].marker = both.instruments[0].marker;
+  other.instruments = {both.instruments[1]};
+  int strayed = 0;
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    Random random(seed);
+    const auto q = apart(both, random);
+    const cv::Mat hidden = scenes::render(other, {q[1]}, seed), shows = scenes::render(both, q, seed);
+    for (const double frame_budget : {1, 3000, 8000}) {
+      Tracker tracker(scenes::usual_rig(), {.frame_budget = frame_budget});
+      for (int i = 0; i < 20; ++i) tracker.track(hidden);
+      strayed += tracker.track(hidden)[0].status == Status::ok;
+      for (int i = 0; i < 5; ++i) tracker.track(shows);
+      expect_right(tracker.track(shows)[0], q[0]);
+    }
+  }
+  EXPECT_GE(strayed, 9) << "the test's own power";
+}
+
 // A rig a few millimetres off looks like a misprint: what needs no registration is given all the same.
 TEST(SurfaceTracker, AContradictedRegistrationIsNoMismatchedMarkerWithinABudget) {
   int contradicted = 0;

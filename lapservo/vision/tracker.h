@@ -29,11 +29,11 @@ struct TrackerOptions {
   /// Method::surface: the budget of a frame, in units of work; nullopt: as much as it takes. A unit is about half a
   /// microsecond of a core of 2.3 GHz, but counted, not measured by a clock: the same frames give the same results
   /// whatever else the machine does. An instrument that is followed takes 500 to 700, 3000 where the camera's
-  /// processing shows; a search for one that is hidden, a hundred times that, goes on in the frames to come where it
-  /// stopped. Until it comes to its end the status is what is known so far. Images that don't follow one another need
-  /// nullopt. Frames of `single` are always searched whole. Work that can't wait for the next frame goes beyond the
-  /// budget: who is followed, a second print's place, a registration that is contradicted, a shaft that the border
-  /// cuts.
+  /// processing shows, more where it misses the RCM: another one is looked for. A search for one that is hidden takes a
+  /// hundred times that and goes on in the frames to come where it stopped. Until it comes to its end the status is
+  /// what is known so far. Images that don't follow one another need nullopt. Frames of `single` are always searched
+  /// whole. Work that can't wait for the next frame goes beyond the budget: who is followed, a second print's place, a
+  /// registration that is contradicted, a shaft that the border cuts.
   std::optional<double> frame_budget = 8000;
   /// Method::surface: an instrument is `uncertain` where Observation::p_false is larger, beyond 1.5 times what the
   /// rig's own tolerance of the print adds. Above 0, at most 1.

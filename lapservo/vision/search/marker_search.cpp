@@ -101,7 +101,7 @@ Found detect_in_blob(const SearchFrame& frame, bool through_rcm, const Blob& blo
     Found found = try_start(frame.scene, frame.light, starts[i], budget);
     if (!found.fit) {
       // A misprint is no reason to look for the marker elsewhere, with a boundary less.
-      if (found.status == Status::marker_mismatch) return found;
+      if (found.status == Status::marker_mismatch) return walk.finish(blob), found;
       if (!best.fit && best.status == Status::no_marker) best = found;  // the likeliest start's refusal stays
       continue;
     }
@@ -112,15 +112,31 @@ Found detect_in_blob(const SearchFrame& frame, bool through_rcm, const Blob& blo
   return has_rivals ? refusal(Status::ambiguous, best.fit->unknowns) : best;
 }
 
-Found detect(const SearchFrame& frame, bool through_rcm, BlobWalk& walk, WorkBudget& budget) {
+// Places within a radius are one.
+bool are_apart(const Scene& scene, const PoseUnknowns& one, const PoseUnknowns& other) {
+  const auto middle = [&](const PoseUnknowns& unknowns) {
+    return scene.camera.raw_from_point(point_on_axis(unknowns.pose(), scene.marker.length_m() / 2));
+  };
+  const double radius_px =
+      scene.marker.radius_m() / one.pose().camera_from_unrolled.translation.norm() * scene.camera.fx_px;
+  return (middle(other) - middle(one)).norm() > radius_px;
+}
+
+// `beside` a marker neither that, nor a misprint, nor one that misses the RCM counts.
+Found detect(const SearchFrame& frame, bool through_rcm, BlobWalk& walk, WorkBudget& budget,
+             const PoseUnknowns* beside = nullptr) {
+  const auto counts = [&](const Found& found) {
+    if (!beside) return found.fit || found.status == Status::marker_mismatch;
+    return found.fit && found.fit->unknowns.through_rcm() && are_apart(frame.scene, *beside, found.fit->unknowns);
+  };
   Found best;
   for (const Blob* blob : walk.rest(frame.blobs, reach_px(frame))) {
     Found found = detect_in_blob(frame, through_rcm, *blob, walk, budget);
-    if (found.fit || found.status == Status::marker_mismatch) {
+    if (counts(found)) {
       walk.done = true;
       return found;
     }
-    if (best.status == Status::no_marker) best = std::move(found);
+    if (!beside && best.status == Status::no_marker) best = std::move(found);
     if (walk.stopped()) return best;
   }
   walk.done = true;
@@ -128,22 +144,16 @@ Found detect(const SearchFrame& frame, bool through_rcm, BlobWalk& walk, WorkBud
 }
 
 // Whether the marker shows in another place as well: a second print, a reflection, an image of tiles. The RCM would
-// show which is ours. Places within a radius are one. All in one frame: in another a rival may be where none was.
-// Nullopt where the budget ends first.
+// show which is ours. All in one frame: in another a rival may be where none was. Nullopt where the budget ends first.
 std::optional<bool> has_rival(const SearchFrame& frame, const FineFit& fit, WorkBudget& budget) {
   const Scene& scene = frame.scene;
-  const auto middle = [&](const PoseUnknowns& unknowns) {
-    return scene.camera.raw_from_point(point_on_axis(unknowns.pose(), scene.marker.length_m() / 2));
-  };
-  const double apart_px =
-      scene.marker.radius_m() / fit.unknowns.pose().camera_from_unrolled.translation.norm() * scene.camera.fx_px;
   for (const Blob& blob : frame.blobs)
     for (const PoseUnknowns& start : starts_in(frame, false, blob, budget).poses) {
-      if ((middle(start) - middle(fit.unknowns)).norm() < apart_px) continue;
+      if (!are_apart(scene, fit.unknowns, start)) continue;
       if (!budget.allows(costs.try_start())) return std::nullopt;
       const Found other = try_start(scene, frame.light, start, budget);
       if (other.status == Status::marker_mismatch) return true;
-      if (other.fit && (middle(other.fit->unknowns) - middle(fit.unknowns)).norm() > apart_px) return true;
+      if (other.fit && are_apart(scene, fit.unknowns, other.fit->unknowns)) return true;
     }
   return false;
 }
@@ -286,6 +296,12 @@ Found MarkerSearch::look_with_rcm(const SearchFrame& frame, WorkBudget& budget) 
   if (found.fit || hidden_.done) begin_anew(found.fit ? Status::no_marker : status_);
   if (found.fit || plain.status == Status::no_marker) return found;
   return plain;
+}
+
+Found MarkerSearch::look_beside(const PoseUnknowns& missing, const SearchFrame& frame, WorkBudget& budget) {
+  Found found = detect(frame, true, plain_, budget, &missing);
+  if (plain_.done) plain_ = {};
+  return found;
 }
 
 Found MarkerSearch::look(const SearchFrame& frame, WorkBudget& budget) {

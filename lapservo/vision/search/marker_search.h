@@ -43,6 +43,8 @@ class MarkerSearch {
  public:
   /// While the search goes on, the status is what it knows so far, or the last whole search came to.
   Found look(const SearchFrame& frame, WorkBudget& budget);
+  /// Only for one that shows plainly and passes through the well known RCM, in another place than one that misses it.
+  Found look_beside(const PoseUnknowns& missing, const SearchFrame& frame, WorkBudget& budget);
 
  private:
   Found look_without_rcm(const SearchFrame& frame, WorkBudget& budget);
