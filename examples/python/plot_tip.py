@@ -27,11 +27,14 @@ def table(path, *columns):
 
 true_rig = run / "true_rig.yaml"  # where it differs from the loop's
 camera_from_rcm = lapservo.Rig.load(true_rig if true_rig.exists() else run / "rig.yaml").instruments[0].camera_from_rcm
+with open(run / "log.csv") as log:
+    goes_on = np.array([row["action"] != "hold" for row in csv.DictReader(log)])
 time_s, theta, phi, rho_m = table(run / "log.csv", "time_s", "true_theta_rad", "true_phi_rad", "true_rho_m").T
+trajectory_s = np.append(0, np.cumsum(np.diff(time_s) * goes_on[:-1]))  # which stands in a hold
 axis = np.stack([np.sin(phi) * np.cos(theta), np.sin(phi) * np.sin(theta), np.cos(phi)])
 tip = camera_from_rcm[:3, :3] @ ((rho_m + tip_m) * axis) + camera_from_rcm[:3, 3:]
 knots = table(goal_file, "time_s", "x_m", "y_m", "z_m").T
-goal = np.stack([np.interp(time_s, knots[0], axis) for axis in knots[1:]])
+goal = np.stack([np.interp(trajectory_s, knots[0], axis) for axis in knots[1:]])
 
 steady = (time_s > 4) & np.isfinite(tip[0])
 sight = goal / np.linalg.norm(goal, axis=0)

@@ -99,7 +99,7 @@ class Shell:
             if enough and CAMERA not in command:
                 running.wait_for(enough)
                 running.interrupt()
-                return
+                return running.said()
             result = running.result()
         finally:
             running.signal(signal.SIGKILL)
@@ -108,6 +108,7 @@ class Shell:
             assert result == 2 and f"{NO_CAMERA}: gives no images" in running.said(), running.said()
         else:
             assert result in ((0, 1) if MAY_BE_1.match(command) else (0,)), running.said()
+        return running.said()
 
     @contextlib.contextmanager
     def beside(self, commands):
@@ -126,6 +127,8 @@ class Shell:
                 assert service.process.poll() is None, service.said()
 
     def run_all(self, commands):
+        """Returns the output of the commands, without that of the services."""
+        said = ""
         own = [command for command in commands if SERVICES.match(command)]
         own += [command for command in commands if LOOP.match(command)][:-1]
         with self.beside(own):
@@ -133,7 +136,8 @@ class Shell:
                 if command in own:
                     continue
                 with self.beside(self.arm_of(command) if not own else []):
-                    self.run(command)
+                    said += self.run(command)
+        return said
 
     def arm_of(self, command):
         """The arm and camera that a line takes for granted, slow enough for any computer, and their rig."""

@@ -1,7 +1,7 @@
 """Every block of commands and code in README.md, CONTRIBUTING.md and docs/ is run, in its page's order.
 
 A page has a folder with the files that it presumes: the recordings of `lapservo sample`. Lists here and in doc_shell.py name the blocks that
-are not run, or not to their end, with the reason. A block that is in no list and does not run fails.
+are not run, or not to their end, with the reason. A block that is in no list and does not run fails. A page's "It prints" is compared.
 """
 
 import re
@@ -160,7 +160,7 @@ def run_python(block, folder, environment):
 def test_every_block_runs(blocks, request, tmp_path):
     if blocks:
         furnish(tmp_path, request.getfixturevalue("sample"))
-    shell = Shell(tmp_path)
+    shell, said = Shell(tmp_path), ""
     for block in blocks:
         print(block.where, flush=True)
         if block.language == "yaml":
@@ -170,7 +170,9 @@ def test_every_block_runs(blocks, request, tmp_path):
         elif block.language == "python":
             run_python(block, tmp_path, shell.environment)
         else:
-            shell.run_all(run_lines([block]))
+            said += shell.run_all(run_lines([block]))
+    for promised in re.findall(r"It prints `([^`]*)`", blocks[0].page.read_text() if blocks else ""):
+        assert promised in said, said
     shutil.rmtree(tmp_path / "swing", ignore_errors=True)  # half a gigabyte of images
 
 
