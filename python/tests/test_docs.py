@@ -201,6 +201,7 @@ def test_the_tutorials_rig_is_the_true_one(tutorial):
     designed = re.search(r"^marker:\n((?:  .*\n)+)", said, re.MULTILINE)[1]
     first_rig = next(block.text for block in BLOCKS if block.page.name == "tutorial.md" and block.language == "yaml")
     assert textwrap.indent(designed, "    ") in first_rig
+    assert "endoscope_moved" not in (folder / "run" / "log.csv").read_text()  # in its first loop
 
 
 @pytest.mark.wire

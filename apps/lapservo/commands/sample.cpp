@@ -23,6 +23,7 @@
 #include "lapservo/rig/joint_conversion.h"
 #include "lapservo/rig/rig_writer.h"
 #include "lapservo/sim/boards.h"
+#include "lapservo/sim/endoscope.h"
 #include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/renderer.h"
 #include "lapservo/sim/tissue.h"
@@ -33,8 +34,9 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int boards = 12, turn_images = 48, swing_images = 100;
-constexpr double image_fps = 8, video_fps = 30, swing_s = swing_images / image_fps, delay_s = 0.12;
+constexpr double image_fps = 8, video_fps = 30, swing_s = swing_images / image_fps;
 constexpr int video_frames = static_cast<int>(swing_s * video_fps);
+const double delay_s = EndoscopeConfig().latency_s;  // so that the simulator's camera is as late as the rig found here
 constexpr std::uint64_t seed = 3;
 constexpr std::uintmax_t needed_bytes = 256 << 20;
 
