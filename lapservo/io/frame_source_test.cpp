@@ -157,6 +157,22 @@ TEST(VideoSource, SaysTheRateThatItAssumes) {
   }
 }
 
+TEST(VideoSource, OfAPaletteOrOfFewBitsAChannelIsRefused) {
+  const testing::TemporaryFolder folder;
+  const std::string raw = "-c:v rawvideo -pix_fmt ";
+  for (const auto& [name, arguments, problem] : {std::tuple{"a.gif", std::string(), "has a palette, expected"},
+                                                 {"a.avi", "-c:v png -pix_fmt pal8", "has a palette, expected"},
+                                                 {"rgb8.nut", raw + "rgb8", "has 2 bits a channel, expected"},
+                                                 {"rgb444.nut", raw + "rgb444le", "has 4 bits a channel, expected"},
+                                                 {"rgb565.nut", raw + "rgb565le", ""}}) {
+    const fs::path path = folder / name;
+    if (!testing::ffmpeg("-f lavfi -i testsrc=s=64x48:r=25 -frames:v 5 " + arguments + " '" + path.string() + "'"))
+      GTEST_SKIP() << "FFmpeg here can't write " << name;
+    const std::string said = refusal(path);
+    EXPECT_TRUE(*problem == 0 ? said.empty() : testing::has(said, problem)) << name << ": " << said;
+  }
+}
+
 // DICOM, and videos whose recorder was switched off before it wrote where the frames are.
 TEST(OpenFrameSource, NamesWhatCanNotBeRead) {
   const testing::TemporaryFolder folder;

@@ -154,9 +154,8 @@ Picture decode_picture(std::span<const std::uint8_t> bytes, const std::string& s
     throw InputError(source, "EXIF orientation", std::to_string(*orientation),
                      "1: the pixels as the calibrated camera has them, not to be turned");
   const bool is_png = format == PictureFormat::png, is_jpeg = format == PictureFormat::jpeg;
-  const DecodedPicture decoded = is_png    ? decode_png(bytes)
-                                 : is_jpeg ? decode_jpeg(bytes)
-                                           : DecodedPicture{libav_decode(bytes), ""};
+  const DecodedPicture decoded = is_png ? decode_png(bytes) : is_jpeg ? decode_jpeg(bytes) : libav_decode(bytes);
+  if (!decoded.coarse.empty()) throw InputError(source, decoded.coarse);
   if (is_jpeg && !decoded.complaint.empty() && text_of(bytes).rfind("\xff\xd9") == std::string_view::npos)
     throw InputError(source, "is a truncated JPEG, expected a whole image");
   if (decoded.bgr.empty())

@@ -34,8 +34,8 @@ struct Picture {
 /// Decodes an image. Light that a PNG names by cICP or gAMA is read as sRGB; grey is repeated over the channels, alpha
 /// dropped, 16-bit rounded to 8. Throws InputError for anything that isn't a whole image of the camera's pixels: empty,
 /// larger than 256 MiB, truncated (PNG without its end chunk), not decodable, of several images, TIFF, HEIC, CMYK,
-/// other pixel types, or to be turned by EXIF, as a calibration belongs to the pixels in one orientation and it is
-/// unknown to which.
+/// with a palette or fewer than 5 bits a channel, other pixel types, or to be turned by EXIF, as a calibration belongs
+/// to the pixels in one orientation and it is unknown to which.
 Picture read_picture(const std::filesystem::path& path);
 Picture decode_picture(std::span<const std::uint8_t> bytes, const std::string& source);
 

@@ -158,6 +158,19 @@ TEST(Image, OfAFormatThatIsNotReadIsNamed) {
   EXPECT_EQ(refusal(jpeg), "p: is a JPEG in CMYK, which is not read: convert it to PNG in RGB");
 }
 
+// Each of a palette's colours stands for many: edges between two are not where the light's were.
+TEST(Image, OfAPaletteOrOfFewBitsAChannelIsRefused) {
+  const std::string remedy =
+      ", expected the camera's colours, of 5 bits a channel or more: record or export it again in true colour, as a "
+      "conversion does not restore them";
+  Bytes png = encoded(shades(), ".png");
+  png[25] = 3;  // of indices
+  EXPECT_EQ(refusal(png), "p: has a palette" + remedy);
+  png[24] = 4, png[25] = 0;
+  EXPECT_EQ(refusal(png), "p: has 4 bits a channel" + remedy);
+  EXPECT_EQ(refusal(bytes_of("P4\n8 1\n\xff")), "p: has 1 bits a channel" + remedy);
+}
+
 Bytes joined(const std::vector<Bytes>& parts) {
   Bytes all;
   for (const Bytes& part : parts) all.insert(all.end(), part.begin(), part.end());

@@ -15,6 +15,7 @@ namespace lapservo::internal {
 struct DecodedPicture {
   cv::Mat bgr;
   std::string complaint;
+  std::string coarse{};  ///< by coarse_pixels(); then without an image
 };
 
 /// By libjpeg, whose warnings OpenCV swallows, and as check_jpeg() has it.

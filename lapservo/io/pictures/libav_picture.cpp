@@ -1,6 +1,7 @@
 #include "lapservo/io/pictures/libav_picture.h"
 
 #include <cstring>
+#include <string>
 #include <utility>
 
 extern "C" {
@@ -78,7 +79,7 @@ struct Layout {
 
 Layout layout_of(AVPixelFormat format) {
   const AVPixFmtDescriptor& of = *av_pix_fmt_desc_get(format);
-  const bool grey = of.nb_components <= 2 && (of.flags & AV_PIX_FMT_FLAG_PAL) == 0;
+  const bool grey = of.nb_components <= 2;
   const bool deep = of.comp[0].depth > 8;
   if (grey) return deep ? Layout{AV_PIX_FMT_GRAY16, CV_16UC1} : Layout{AV_PIX_FMT_GRAY8, CV_8UC1};
   return deep ? Layout{AV_PIX_FMT_BGR48, CV_16UC3} : Layout{AV_PIX_FMT_BGR24, CV_8UC3};
@@ -88,7 +89,7 @@ Layout layout_of(AVPixelFormat format) {
 cv::Mat pixels_of_yuv(const AVFrame& frame) {
   const AVPixFmtDescriptor& format = *av_pix_fmt_desc_get(static_cast<AVPixelFormat>(frame.format));
   cv::Mat bgr;
-  const bool is_yuv = (format.flags & (AV_PIX_FMT_FLAG_RGB | AV_PIX_FMT_FLAG_PAL)) == 0 && format.nb_components >= 3;
+  const bool is_yuv = (format.flags & AV_PIX_FMT_FLAG_RGB) == 0 && format.nb_components >= 3;
   if (is_yuv) BgrConverter().convert(frame, {.chroma = ChromaSite::centre}, false, bgr);
   return bgr;
 }
@@ -112,14 +113,16 @@ cv::Mat pixels_of(const libav::Frame& decoded) {
 
 }  // namespace
 
-cv::Mat libav_decode(std::span<const std::uint8_t> bytes) {
+DecodedPicture libav_decode(std::span<const std::uint8_t> bytes) {
   const AVCodecID codec = codec_of(picture_format(bytes));
   if (codec == AV_CODEC_ID_NONE) return {};
-  const cv::Mat pixels = pixels_of(decoded_frame(codec, bytes, 0));
+  const libav::Frame frame = decoded_frame(codec, bytes, 0);
+  if (std::string coarse = frame ? coarse_pixels(*frame, codec) : ""; !coarse.empty()) return {{}, "", coarse};
+  const cv::Mat pixels = pixels_of(frame);
   const cv::Mat again = pixels_of(decoded_frame(codec, bytes, 255));
   const bool whole = !pixels.empty() && pixels.size() == again.size() && pixels.type() == again.type() &&
                      cv::norm(pixels, again, cv::NORM_INF) == 0;
-  return whole ? pixels : cv::Mat();
+  return {whole ? pixels : cv::Mat(), ""};
 }
 
 }  // namespace lapservo::internal

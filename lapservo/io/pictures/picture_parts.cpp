@@ -172,6 +172,16 @@ std::size_t picture_count(Bytes bytes) {
   return std::max<std::size_t>(count, 1);
 }
 
+// The error of psi on a rendered swing was 0.93 of its sigma in RGB565, 1.6 in RGB332 and 6.7 in palettes.
+std::string coarse_pixels(bool has_palette, int bits_a_channel) {
+  constexpr int least_bits = 5;
+  if (!has_palette && bits_a_channel >= least_bits) return "";
+  return (has_palette ? "has a palette" : "has " + std::to_string(bits_a_channel) + " bits a channel") +
+         std::string(
+             ", expected the camera's colours, of 5 bits a channel or more: record or export it again in true "
+             "colour, as a conversion does not restore them");
+}
+
 std::optional<std::size_t> exif_orientation(Bytes picture) {
   constexpr std::string_view prefix = "Exif\0\0"sv;
   const Bytes exif = exif_in(picture);

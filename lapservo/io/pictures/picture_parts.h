@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
 #include <string_view>
 
 namespace lapservo::internal {
@@ -57,6 +58,9 @@ std::optional<PictureChunk> png_chunk(std::span<const std::uint8_t> png, std::si
 /// How many images a file holds: one after the other, or as its own animation. 1 for a JPEG that says which of its
 /// images is the first one (MPF, as phones append depth and brightness), and where that can't be seen.
 std::size_t picture_count(std::span<const std::uint8_t> bytes);
+
+/// Why a palette's indices, or channels of few bits, are not read, with the remedy; empty for other pixels.
+std::string coarse_pixels(bool has_palette, int bits_a_channel);
 
 /// The orientation (1 upright, 2 to 8 rotated or mirrored) that a JPEG, PNG or WebP sets for its viewers, by EXIF tag
 /// 0x0112; nullopt without a valid one.

@@ -49,8 +49,6 @@ std::span<const std::uint8_t> chunk_in(std::span<const std::uint8_t> png, std::s
 
 void convert_to_bgr(png_structp png, bool deep) {
   png_set_crc_action(png, PNG_CRC_ERROR_QUIT, PNG_CRC_ERROR_QUIT);
-  png_set_palette_to_rgb(png);
-  png_set_expand_gray_1_2_4_to_8(png);
   png_set_gray_to_rgb(png);
   if (deep) {
     png_set_expand_16(png);
@@ -135,10 +133,13 @@ std::optional<Transfer> png_transfer(std::span<const std::uint8_t> png) {
 }
 
 DecodedPicture decode_png(std::span<const std::uint8_t> bytes) {
+  DecodedPicture picture;
+  const Numbers header{bytes, true};
+  picture.coarse = coarse_pixels(header.of(25, 1) == PNG_COLOR_TYPE_PALETTE, static_cast<int>(header.of(24, 1)));
+  if (!picture.coarse.empty()) return picture;
   Source source{bytes, {}};
   png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &source, on_png_error, on_warning);
   png_infop info = png ? png_create_info_struct(png) : nullptr;
-  DecodedPicture picture;
   const std::optional<Transfer> transfer = png_transfer(bytes);
   std::vector<png_bytep> rows;
   if (info) {

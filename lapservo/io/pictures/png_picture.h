@@ -12,8 +12,8 @@
 
 namespace lapservo::internal {
 
-/// By libpng, every checksum compared: grey repeated over the channels, palettes looked up, alpha dropped, 16 bits
-/// rounded to 8, the transfer that it names undone.
+/// By libpng, every checksum compared: grey repeated over the channels, alpha dropped, 16 bits rounded to 8, the
+/// transfer that it names undone.
 DecodedPicture decode_png(std::span<const std::uint8_t> bytes);
 
 /// By its chunks cICP or gAMA; nullopt for what cameras' responses are, and for what is no PNG. Its first bytes

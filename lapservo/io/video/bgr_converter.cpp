@@ -9,6 +9,8 @@ extern "C" {
 #include <libavutil/pixdesc.h>
 }
 
+#include "lapservo/io/pictures/picture_parts.h"
+
 namespace lapservo::internal {
 namespace {
 
@@ -92,6 +94,15 @@ AVPixelFormat pixel_format_of(const AVFrame& frame) {
       Pair{AV_PIX_FMT_YUVJ411P, AV_PIX_FMT_YUV411P}};
   const auto found = std::ranges::find(full_range, frame.format, &Pair::first);
   return found != full_range.end() ? found->second : static_cast<AVPixelFormat>(frame.format);
+}
+
+// A GIF's decoder looks its palette up itself. Bayer's channels have 8 bits or more, whatever their description says.
+std::string coarse_pixels(const AVFrame& frame, AVCodecID codec) {
+  const AVPixFmtDescriptor* const format = av_pix_fmt_desc_get(static_cast<AVPixelFormat>(frame.format));
+  if (!format || (format->flags & AV_PIX_FMT_FLAG_BAYER) != 0) return "";
+  int bits = format->comp[0].depth;
+  for (int i = 1; i < format->nb_components; ++i) bits = std::min(bits, format->comp[i].depth);
+  return coarse_pixels(codec == AV_CODEC_ID_GIF || (format->flags & AV_PIX_FMT_FLAG_PAL) != 0, bits);
 }
 
 // To planes where there is chroma: three times as fast as to BGR, where swscale takes chroma from the wrong rows

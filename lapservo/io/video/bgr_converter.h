@@ -2,6 +2,7 @@
 
 #include <array>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include <opencv2/core.hpp>
@@ -13,6 +14,9 @@ namespace lapservo::internal {
 
 /// AVFrame::format without the deprecated formats that say full range (yuvj420p ...).
 AVPixelFormat pixel_format_of(const AVFrame& frame);
+
+/// coarse_pixels() of picture_parts.h of a frame that this codec decoded.
+std::string coarse_pixels(const AVFrame& frame, AVCodecID codec);
 
 /// Makes 8-bit BGR of frames, by swscale. Chroma that has fewer samples than luma is interpolated from where these lie:
 /// samples that are repeated instead shift colour boundaries by up to half a pixel.

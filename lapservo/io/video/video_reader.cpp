@@ -319,6 +319,8 @@ class Video : public FrameSource {
 
   // By each frame's own tags: a stream's may change.
   void convert() {
+    if (const std::string coarse = coarse_pixels(*frame_, stream_->codecpar->codec_id); !coarse.empty())
+      throw InputError(source_, coarse);
     const auto colours = yuv_colours_of(*frame_, stream_->codecpar->codec_id, of_software_, given_);
     if (!colours)
       throw InputError(source_, "colour matrix", av_color_space_name(frame_->colorspace),
