@@ -1,5 +1,6 @@
 #include "lapservo/io/frame_source.h"
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cstdint>
@@ -118,7 +119,13 @@ Pictures pictures_in(const fs::path& folder) {
     throw InputError(folder.string(), std::string("has no images") +
                                           (unread > 0 ? " but in TIFF, HEIC, AVIF or DICOM" : "") +
                                           ", expected some (png, jpg, bmp, webp, ppm)");
-  return {ordered_pictures(std::move(files)), unread};
+  PictureOrder order = ordered_pictures(std::move(files));
+  const auto copy = std::ranges::adjacent_find(order.files, {}, [](const fs::path& file) { return file.stem(); });
+  if (copy != order.files.end())
+    throw InputError(folder.string(), fmt::format("has {} and {}, expected one image of a name: put the images of each "
+                                                  "format into a folder of their own",
+                                                  copy->filename().string(), copy[1].filename().string()));
+  return {std::move(order), unread};
 }
 
 void refuse_dicom(const fs::path& path) {

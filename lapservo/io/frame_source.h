@@ -56,8 +56,8 @@ struct VideoReading {
 };
 
 /// All but cameras. `folder_fps` gives the images of a folder their times. Throws InputError when there is nothing to
-/// read: a missing or empty file, a folder without images or with an image that is a link to no file, a video without
-/// frames, a stream that doesn't answer; and for words in `reading` that have no meaning.
+/// read: a missing or empty file, a folder without images, with an image that is a link to no file or with two images
+/// of one name, a video without frames, a stream that doesn't answer; and for words in `reading` that have no meaning.
 std::unique_ptr<FrameSource> open_frame_source(const std::string& input, double folder_fps,
                                                const VideoReading& reading = {});
 

@@ -64,6 +64,8 @@ TEST(FolderSource, SaysWhatItLeavesOutAndTheOrderWherePointsDecide) {
     write_image(points / name, cv::Mat(16, 16, CV_8UC3));
   EXPECT_EQ(open_frame_source(points.path().string(), 30)->remark(),
             "points and signs of the numbers in the names decide the order: 0.25.png, 0.5.png ... 10.5.png");
+  write_image(points / "0.5.jpg", cv::Mat(16, 16, CV_8UC3));
+  EXPECT_TRUE(testing::has(refusal(points.path()), "has 0.5.jpg and 0.5.png, expected one image of a name"));
   fs::create_symlink("not/fetched", points / "2.5.png");
   EXPECT_TRUE(testing::has(refusal(points.path()), "2.5.png: is a link to no file"));
 }
