@@ -133,7 +133,8 @@ CsvTable CsvTable::parse(std::string_view text, std::string source) {
     if (fields.size() != table.header_.size())
       throw InputError(at_line(table.source_, line_number),
                        "has " + std::to_string(fields.size()) + " fields, expected " +
-                           std::to_string(table.header_.size()) + " as the header has");
+                           std::to_string(table.header_.size()) + " as the header has" +
+                           (table.header_[0].starts_with('#') ? ", which is a comment: remove it" : ""));
     table.rows_.push_back(std::move(fields));
     table.line_numbers_.push_back(line_number);
   }

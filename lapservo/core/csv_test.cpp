@@ -90,6 +90,8 @@ TEST(CsvTable, ComplaintsNameFileLineColumnValueAndExpectation) {
   EXPECT_EQ(parse_error(""), "t.csv: is empty, expected a CSV file with a header line");
   EXPECT_EQ(parse_error("\n \r\n"), "t.csv: is empty, expected a CSV file with a header line");
   EXPECT_EQ(parse_error("a,b\n1,2\n\n3\n"), "t.csv:4: has 1 fields, expected 2 as the header has");
+  EXPECT_EQ(parse_error("# mine\na,b\n1,2\n"),
+            "t.csv:2: has 2 fields, expected 1 as the header has, which is a comment: remove it");
   EXPECT_EQ(parse_error("a,b\n1,2,3\n"), "t.csv:2: has 3 fields, expected 2 as the header has");
   EXPECT_EQ(parse_error(std::string_view("a,b\n1,\0\n", 8)), "t.csv: holds NUL bytes, expected CSV text");
   for (const char* row : {"\"a,2", "\"a\"b,2", "1,\"", "1,\"\"\"", "1,\"2\" 3"})

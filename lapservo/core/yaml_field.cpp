@@ -1,5 +1,7 @@
 #include "lapservo/core/yaml_field.h"
 
+#include <algorithm>
+#include <cstddef>
 #include <optional>
 #include <sstream>
 #include <string>
@@ -60,6 +62,14 @@ bool holds_several_documents(const std::string& yaml) {
   return parser.HandleNextDocument(events) && parser.HandleNextDocument(events);
 }
 
+// yaml-cpp complains of both at another place.
+std::string odd_blank_in(std::string_view yaml) {
+  const std::size_t at = std::min(yaml.find('\t'), yaml.find("\xc2\xa0"));
+  if (at == std::string_view::npos) return "";
+  return "line " + std::to_string(1 + std::count(yaml.begin(), yaml.begin() + static_cast<std::ptrdiff_t>(at), '\n')) +
+         " has a tab or a no-break space, write spaces; ";
+}
+
 std::string syntax_problem(const YAML::Exception& error) {
   if (error.mark.is_null()) return error.msg;
   return "line " + std::to_string(error.mark.line + 1) + ", column " + std::to_string(error.mark.column + 1) + ": " +
@@ -80,7 +90,10 @@ YamlField YamlField::read(const fs::path& path, std::string_view kind) {
 
 YamlField YamlField::parse(std::string_view yaml, const std::string& source, std::string_view kind) {
   if (yaml.size() > max_file_bytes) throw InputError(source, "is larger than 1 MiB, expected a " + std::string(kind));
-  if (nests_too_deeply(yaml)) throw InputError(source, "nests more deeply than a " + std::string(kind) + " does");
+  if (nests_too_deeply(yaml))
+    throw InputError(source, yaml.find('\0') != std::string_view::npos
+                                 ? "holds NUL bytes as images do, expected a " + std::string(kind)
+                                 : "nests more deeply than a " + std::string(kind) + " does");
   try {
     const std::string text(yaml);
     if (holds_several_documents(text))
@@ -88,7 +101,8 @@ YamlField YamlField::parse(std::string_view yaml, const std::string& source, std
                                    std::string(kind));
     return {source, "", YAML::Load(text)};
   } catch (const YAML::Exception& error) {
-    throw InputError(source, "is not YAML: " + syntax_problem(error) + ", expected a " + std::string(kind));
+    throw InputError(
+        source, "is not YAML: " + odd_blank_in(yaml) + syntax_problem(error) + ", expected a " + std::string(kind));
   }
 }
 
@@ -160,9 +174,10 @@ std::string YamlField::text(std::string_view expected) const {
 }
 
 double YamlField::number(std::string_view expected) const {
-  const auto value = is_scalar() ? parse_finite(node_->Scalar()) : std::nullopt;
-  if (!value) fail(value_text(), expected);
-  return *value;
+  std::string text = is_scalar() ? node_->Scalar() : "";
+  if (const auto value = parse_finite(text)) return *value;
+  if (const auto comma = text.find(','); comma != std::string::npos) text[comma] = '.';
+  fail(value_text(), parse_finite(text) ? text + ", with a decimal point" : std::string(expected));
 }
 
 bool YamlField::boolean() const {

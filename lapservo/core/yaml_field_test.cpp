@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "lapservo/testing/has.h"
 #include "lapservo/testing/input_error.h"
 
 namespace lapservo::internal {
@@ -22,6 +23,8 @@ TEST(YamlField, KnowsWhereItStands) {
   EXPECT_EQ(number_of(root), "a.yaml: file: is a map, expected a number");
   EXPECT_EQ(number_of(root["a"]["b"]), "a.yaml: a.b: is a list of 2, expected a number");
   EXPECT_EQ(number_of(root["a"]["b"].list("")[1]["c"]), "a.yaml: a.b[1].c: is x, expected a number");
+  EXPECT_EQ(number_of(parse("a: 0,0084")["a"]), "a.yaml: a: is 0,0084, expected 0.0084, with a decimal point");
+  EXPECT_EQ(number_of(parse("a: b,c")["a"]), "a.yaml: a: is b,c, expected a number");
   EXPECT_EQ(number_of(root["a"]["d"]), "a.yaml: a.d: is missing, expected a number");
   EXPECT_EQ(input_error([&] { root["a"]["d"]["e"]; }), "a.yaml: a.d: is missing, expected a map with 'e'");
 }
@@ -49,6 +52,12 @@ TEST(YamlField, OutlivesItsRoot) {
 
 TEST(YamlField, NamesTheKindOfFileThatWasExpected) {
   EXPECT_EQ(input_error([] { parse(std::string(17, '[')); }), "a.yaml: nests more deeply than a file of ours does");
+  EXPECT_EQ(input_error([] { parse(std::string(1, '\0') + std::string(17, '[')); }),
+            "a.yaml: holds NUL bytes as images do, expected a file of ours");
+  for (const char* text : {"a:\n\tb: 1\n\tc: 2\n", "a:\n  b:\xc2\xa0z\n  c: 2\n"})
+    EXPECT_TRUE(testing::has(input_error([&] { parse(text); }),
+                             "is not YAML: line 2 has a tab or a no-break space, write spaces; line "))
+        << text;
   EXPECT_EQ(input_error([] { parse(std::string((1 << 20) + 1, ' ')); }),
             "a.yaml: is larger than 1 MiB, expected a file of ours");
   EXPECT_EQ(input_error([] { parse(std::string(16, '[') + std::string(16, ']')); }), "");

@@ -186,6 +186,11 @@ TEST(OpenFrameSource, NamesWhatCanNotBeRead) {
     testing::write_file(folder / name, whole.substr(0, index - 4));
     EXPECT_TRUE(testing::has(refusal(folder / name), "has no index (moov)"));
   }
+  const std::string plain = (folder / "plain.mp4").string(), turned = (folder / "turned.mp4").string();
+  write_video(plain);
+  if (testing::ffmpeg("-i '" + plain + "' -c copy -metadata:s:v:0 rotate=90 '" + turned + "'")) {
+    EXPECT_TRUE(testing::has(refusal(turned), "expected the camera's pixels upright: ffmpeg -i IN"));
+  }
   const std::string dicom = std::string(128, '\0') + "DICM" + std::string("\2\0\0\0UL\4\0\0\0\0\0", 12);
   for (const char* name : {"a.dcm", "IM00001", "a.png", "a.mp4"}) {
     testing::write_file(folder / name, dicom);

@@ -486,6 +486,8 @@ void check_distinguishable(const std::vector<Instrument>& instruments, const std
 }
 
 Rig parse_root(const YamlField& root, const fs::path& folder) {
+  if (root.is_map() && root["camera_matrix"].present() && !root["instruments"].present())
+    root.fail("a camera file", "a rig file with instruments, whose camera may be the path of this file");
   expect_keys(root, {{"camera", "instruments"}, {}});
   Rig rig;
   const YamlField camera = root["camera"];

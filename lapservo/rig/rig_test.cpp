@@ -132,6 +132,8 @@ std::string unknown(const std::string& field, const std::string& nearest) {
 
 const Complaints missing_keys{
     {" \n", "file: is missing, expected a map with 'camera'"},
+    {"image_width: 640\ncamera_matrix: {}",
+     "file: is a camera file, expected a rig file with instruments, whose camera may be the path of this file"},
     {"instruments: []", "camera: is missing, expected a map with 'image_width'"},
     {good.substr(0, good.find("instruments")), "instruments: is missing, expected a list of instruments"},
     {good.substr(0, good.find("  - name")) + "  []\n",

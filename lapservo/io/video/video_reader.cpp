@@ -70,7 +70,9 @@ class Video : public FrameSource {
     open();
     stream_ = format_->streams[choose_stream()];
     if (turned(*stream_))
-      throw InputError(source_, "is to be turned for display, expected the camera's pixels upright");
+      throw InputError(source_,
+                       "is to be turned for display, expected the camera's pixels upright: ffmpeg -i IN -c copy "
+                       "-metadata:s:v:0 rotate=0 OUT.mp4 keeps them");
     open_decoder();
     first_ = read();
     if (!first_)
