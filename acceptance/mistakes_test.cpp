@@ -141,6 +141,13 @@ const Changes guessed_focal{{focal, "[1200, 0, 474.3, 0, 1200,"}};
 std::vector<Mistake> mistakes() {
   const auto moved_endoscope = mounted("swing", {{"[-0.078, 0.067, 0.059]", "[-0.072, 0.067, 0.063]"}});
   return {
+      {"radius, nothing calibrated",
+       [] {
+         rewrite("rig.yaml", changed(read_file("../sample/rig.yaml"),
+                                     {{diameter, "diameter_m: 0.0042"}, {"[90, 180, 270]", "[116, 209, 294]"}}));
+       },
+       {track},
+       {"with a diameter of 8.40 mm, twice the rig's", "not the radius"}},
       {"diameter 5 % off",
        in_rig({{diameter, "diameter_m: 0.0088"}}),
        {marker},
