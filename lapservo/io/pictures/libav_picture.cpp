@@ -79,7 +79,7 @@ struct Layout {
 
 Layout layout_of(AVPixelFormat format) {
   const AVPixFmtDescriptor& of = *av_pix_fmt_desc_get(format);
-  const bool grey = of.nb_components <= 2;
+  const bool grey = of.nb_components <= 2 && (of.flags & AV_PIX_FMT_FLAG_PAL) == 0;
   const bool deep = of.comp[0].depth > 8;
   if (grey) return deep ? Layout{AV_PIX_FMT_GRAY16, CV_16UC1} : Layout{AV_PIX_FMT_GRAY8, CV_8UC1};
   return deep ? Layout{AV_PIX_FMT_BGR48, CV_16UC3} : Layout{AV_PIX_FMT_BGR24, CV_8UC3};

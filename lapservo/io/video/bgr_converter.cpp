@@ -84,6 +84,16 @@ AVPixelFormat format_of(YuvPicture::Layout layout) {
   return formats.at(static_cast<std::size_t>(layout));
 }
 
+// As grey images of BMP have it.
+bool is_of_all_greys(const AVFrame& frame) {
+  if (!frame.data[1]) return false;
+  const cv::Mat_<cv::Vec4b> palette(1, 256, reinterpret_cast<cv::Vec4b*>(frame.data[1]));
+  for (int i = 0; i < palette.cols; ++i)
+    for (int channel = 0; channel < 3; ++channel)
+      if (palette(0, i)[channel] != i) return false;
+  return true;
+}
+
 }  // namespace
 
 AVPixelFormat pixel_format_of(const AVFrame& frame) {
@@ -102,7 +112,8 @@ std::string coarse_pixels(const AVFrame& frame, AVCodecID codec) {
   if (!format || (format->flags & AV_PIX_FMT_FLAG_BAYER) != 0) return "";
   int bits = format->comp[0].depth;
   for (int i = 1; i < format->nb_components; ++i) bits = std::min(bits, format->comp[i].depth);
-  return coarse_pixels(codec == AV_CODEC_ID_GIF || (format->flags & AV_PIX_FMT_FLAG_PAL) != 0, bits);
+  const bool has_palette = (format->flags & AV_PIX_FMT_FLAG_PAL) != 0 && !is_of_all_greys(frame);
+  return coarse_pixels(codec == AV_CODEC_ID_GIF || has_palette, bits);
 }
 
 // To planes where there is chroma: three times as fast as to BGR, where swscale takes chroma from the wrong rows
