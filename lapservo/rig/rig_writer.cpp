@@ -4,6 +4,7 @@
 #include <optional>
 #include <string_view>
 #include <system_error>
+#include <type_traits>
 #include <vector>
 
 #include <fmt/format.h>
@@ -18,23 +19,26 @@ namespace lapservo::internal {
 namespace {
 namespace fs = std::filesystem;
 
-// {} writes the shortest text that reads back as the same number.
 template <typename Number>
 std::string text_of(const Number& number) {
+  if constexpr (std::is_same_v<Number, double>) return yaml_number(number);
   return fmt::format("{}", number);
+}
+template <typename Item>
+std::string text_of(const std::vector<Item>& items) {
+  std::vector<std::string> texts;
+  for (const Item& item : items) texts.push_back(text_of(item));
+  return fmt::format("[{}]", fmt::join(texts, ", "));
 }
 template <typename Item, std::size_t N>
 std::string text_of(const std::array<Item, N>& items) {
-  return fmt::format("[{}]", fmt::join(items, ", "));
-}
-std::string text_of(const std::vector<double>& numbers) {
-  return fmt::format("[{}]", fmt::join(numbers, ", "));
+  return text_of(std::vector(items.begin(), items.end()));
 }
 std::string text_of(const Eigen::Vector3d& point) {
   return text_of(std::array{point.x(), point.y(), point.z()});
 }
 std::string text_of(const ChromaticAberration& aberration) {
-  return fmt::format("{{blue: {}, red: {}}}", aberration.blue, aberration.red);
+  return fmt::format("{{blue: {}, red: {}}}", text_of(aberration.blue), text_of(aberration.red));
 }
 
 template <typename Numbers>
@@ -158,7 +162,8 @@ std::string wrist_joints_yaml(const Tool& tool, int indent) {
   std::string text;
   for (const WristJoint& joint : tool.wrist)
     text += fmt::format("{:{}}- {{name: {}, alpha_rad: {}, a_m: {}, theta_rad: {}, d_m: {}}}\n", "", indent,
-                        quoted(joint.name), joint.alpha_rad, joint.a_m, joint.theta_rad, joint.d_m);
+                        quoted(joint.name), text_of(joint.alpha_rad), text_of(joint.a_m), text_of(joint.theta_rad),
+                        text_of(joint.d_m));
   return text;
 }
 
@@ -215,6 +220,12 @@ bool is_file_of(const Read& read, const fs::path& path) {
 }
 
 }  // namespace
+
+std::string yaml_number(double number) {
+  std::string text = fmt::format("{}", number);
+  if (const auto e = text.find('e'); e < text.size() && text.find('.') > e) text.insert(e, ".0");
+  return text;
+}
 
 std::string camera_yaml(const Camera& camera, int indent) {
   const CameraSigmas& sigmas = camera.sigmas;

@@ -7,6 +7,9 @@
 
 namespace lapservo::internal {
 
+/// The shortest text that reads back as the same number, by YAML 1.1 as well: 4.0e-05, as 4e-05 is a text there.
+std::string yaml_number(double number);
+
 /// The rig as YAML that parse_rig() reads back to the last bit. With the file that it is written to, a camera_file is
 /// named so that it is found from there, links by their own names; else the camera stands in the rig itself.
 std::string rig_yaml(const Rig& rig, const std::filesystem::path& destination = {});

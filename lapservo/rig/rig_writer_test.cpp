@@ -27,34 +27,34 @@ constexpr auto every_key = R"(camera:
   distortion_model: plumb_bob
   camera_matrix: {rows: 3, cols: 3, data: [500.25, 0, 320, 0, 501, 240, 0, 0, 1]}
   sigma_camera_matrix: {rows: 3, cols: 3, data: [0.1, 0, 0.2, 0, 0.3, 0.4, 0, 0, 0]}
-  distortion_coefficients: {rows: 1, cols: 5, data: [-0.1, 0.02, 0.001, -0.002, 1e-17]}
+  distortion_coefficients: {rows: 1, cols: 5, data: [-0.1, 0.02, 0.001, -0.002, 1.0e-17]}
   sigma_distortion_coefficients: {rows: 1, cols: 5, data: [0.01, 0.02, 0.03, 0.04, 0.05]}
   response: {light: [0, 0.2, 1], value: [0, 0.5, 1], sigma_light: [0, 0.01, 0], sigma_value: [0, 0.02, 0]}
   sigma_response: 0.003
   lateral_chromatic_aberration: {blue: 0.9993, red: 1.0007}
-  sigma_lateral_chromatic_aberration: {blue: 1e-05, red: 2e-05}
+  sigma_lateral_chromatic_aberration: {blue: 1.0e-05, red: 2.0e-05}
   deinterlace: true
 instruments:
   - name: "a \"b\" \\ # : é"
     marker:
       diameter_m: 0.0084
-      sigma_diameter_m: 1e-05
+      sigma_diameter_m: 1.0e-05
       hues_deg: [90.1, 180.2, 270.3]
       sigma_hues_deg: [0.5, 0.25, 1]
       bands_upper_m: [0.0035, 0.0036, 0.0169]
-      sigma_bands_upper_m: [1e-06, 2e-06, 3e-06]
+      sigma_bands_upper_m: [1.0e-06, 2.0e-06, 3.0e-06]
       bands_lower_m: [0.0095, 0.0094, 0.0053]
-      sigma_bands_lower_m: [4e-06, 5e-06, 6e-06]
+      sigma_bands_lower_m: [4.0e-06, 5.0e-06, 6.0e-06]
       seam_rad: 0.1
       sigma_seam_rad: 0.001
       wrap_m: 0.0003
-      sigma_wrap_m: 7e-06
+      sigma_wrap_m: 7.0e-06
       skew_m: 0.0002
-      sigma_skew_m: 8e-06
+      sigma_skew_m: 8.0e-06
       gap_rad: 0.2
       sigma_gap_rad: 0.002
       tolerance_m: 0.0001
-      sigma_tolerance_m: 9e-06
+      sigma_tolerance_m: 9.0e-06
     camera_from_rcm:
       translation_m: [-0.0778, 0.0672, 0.0592]
       sigma_translation_m: [0.0001, 0.0002, 0.0003]

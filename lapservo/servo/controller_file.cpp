@@ -10,6 +10,7 @@
 #include "lapservo/core/joint_units.h"
 #include "lapservo/core/known_keys.h"
 #include "lapservo/core/yaml_field.h"
+#include "lapservo/rig/rig_writer.h"
 
 namespace lapservo {
 using namespace internal;
@@ -61,7 +62,7 @@ TrackingGains usual_gains(ControlMode mode, double period_s) {
 }
 
 std::string list_of(const Eigen::Vector4d& v) {
-  return fmt::format("[{}, {}, {}, {}]", v[0], v[1], v[2], v[3]);
+  return fmt::format("[{}, {}, {}, {}]", yaml_number(v[0]), yaml_number(v[1]), yaml_number(v[2]), yaml_number(v[3]));
 }
 
 }  // namespace
@@ -96,15 +97,16 @@ ControllerConfig controller_for_arm(ControllerConfig base, const std::optional<s
 
 std::string controller_yaml(const ControllerConfig& config) {
   std::string text = fmt::format("mode: {}\nperiod_s: {}\ngains_per_s: {}\ndelay_s: {}\nmodel_error: {}\n",
-                                 to_string(config.mode), config.period_s, list_of(config.gains.per_s),
-                                 config.observer.delay_s ? fmt::format("{}", *config.observer.delay_s) : "estimate",
-                                 config.model_error);
+                                 to_string(config.mode), yaml_number(config.period_s), list_of(config.gains.per_s),
+                                 config.observer.delay_s ? yaml_number(*config.observer.delay_s) : "estimate",
+                                 yaml_number(config.model_error));
   text +=
       fmt::format("limits:\n  lower: {}\n  upper: {}\n  rate: {}\n  acceleration: {}\n", list_of(config.limits.lower),
                   list_of(config.limits.upper), list_of(config.limits.rate), list_of(config.limits.acceleration));
   if (config.window)
-    text += fmt::format("window: {{u_min_px: {}, u_max_px: {}, v_min_px: {}, v_max_px: {}}}\n", config.window->u_min_px,
-                        config.window->u_max_px, config.window->v_min_px, config.window->v_max_px);
+    text += fmt::format("window: {{u_min_px: {}, u_max_px: {}, v_min_px: {}, v_max_px: {}}}\n",
+                        yaml_number(config.window->u_min_px), yaml_number(config.window->u_max_px),
+                        yaml_number(config.window->v_min_px), yaml_number(config.window->v_max_px));
   return text;
 }
 
