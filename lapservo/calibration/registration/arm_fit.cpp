@@ -28,6 +28,7 @@ ArmModel::ArmModel(const Instrument& instrument, const ArmStart& start, const Jo
   for (std::size_t j = 0; j < 4; ++j) {
     const auto [low, high] = std::ranges::minmax_element(recording.joints, {}, [=](const auto& at) { return at[j]; });
     if ((*high)[j] - (*low)[j] > least_travel[j]) moving_.push_back(j);
+    middle_[j] = (start.ranges.low[j] + start.ranges.high[j]) / 2;
   }
   add_unknowns(start.delay_s, faults);
 }
@@ -65,8 +66,14 @@ Rigid3 ArmModel::camera_from_rcm(const Eigen::VectorXd& x) const {
   return {(guess_.camera_from_rcm.rotation * rotation_by(turn)).normalized(), blocks_.translation.of(x)};
 }
 
-Rigid3 ArmModel::camera_from_rcm_at(const Eigen::VectorXd& x, double time_s) const {
+Rigid3 ArmModel::camera_from_rcm_at(const Eigen::VectorXd& x, double time_s, const std::array<double, 4>& at) const {
   Rigid3 camera_from_rcm = this->camera_from_rcm(x);
+  Eigen::Vector3d given_m = Eigen::Vector3d::Zero();
+  for (std::size_t k = 0; k < faults_.size(); ++k)
+    if (const auto j = faults_[k].gives_with)
+      given_m[faults_[k].along] += blocks_.joints.of(x)[static_cast<Eigen::Index>(k)] * (at[*j] - middle_[*j]);
+  const auto q = JointVector::from_vector(q_from_joints(guess_.joints, Eigen::Vector4d(middle_.data())));
+  camera_from_rcm.translation += camera_from_rcm.rotation * (rcm_from_unrolled(q).rotation * given_m);
   if (blocks_.drift.size == 0) return camera_from_rcm;
   const double first_s = poses_.front().time_s, span_s = std::max(1e-9, poses_.back().time_s - first_s);
   const double part = (time_s - first_s) / span_s - 0.5;
@@ -99,7 +106,7 @@ Eigen::MatrixXd ArmModel::residuals(const Eigen::VectorXd& x) const {
     const auto at = instrument.at(time_s);
     if (!at) continue;
     const auto q = JointVector::from_vector(q_from_joints(joints, Eigen::Vector4d(at->data())));
-    all.col(static_cast<Eigen::Index>(i)) = difference(poses_[i], camera_from_rcm_at(x, poses_[i].time_s), q, x);
+    all.col(static_cast<Eigen::Index>(i)) = difference(poses_[i], camera_from_rcm_at(x, poses_[i].time_s, *at), q, x);
   }
   return all;
 }
@@ -120,7 +127,7 @@ Eigen::Matrix<double, 6, 1> ArmModel::difference(const TimedPose& pose, const Ri
   const Observation::MarkerPose& seen = pose.marker;
   double focal = 0;
   for (std::size_t k = 0; k < faults_.size(); ++k)
-    if (!faults_[k].mend) focal += blocks_.joints.of(x)[static_cast<Eigen::Index>(k)];
+    if (!faults_[k].mend && !faults_[k].gives_with) focal += blocks_.joints.of(x)[static_cast<Eigen::Index>(k)];
   const Eigen::Vector3d origin = pose.origin() + focal * pose.by_focal.origin_m;
   const Eigen::Vector3d turned = focal * pose.by_focal.turn_rad;
   const Eigen::Quaterniond seen_rotation =
@@ -290,10 +297,17 @@ std::optional<ArmFit> fit_arm(const Instrument& instrument, const ArmStart& star
   const Eigen::VectorXd bias = result->fit.x - fit.x.head(numbers);
   result->covariance = (arm_covariance(fit) + fit.departures.by_seen).topLeftCorner(numbers, numbers) +
                        bias * bias.transpose() + without.by_instead;
+  Eigen::VectorXd sizes = fit.x.segment(joints, static_cast<Eigen::Index>(with.joints.size()));
   for (std::size_t k = free.joints.size(); k < with.joints.size(); ++k) {
-    const double size = fit.x[joints + static_cast<Eigen::Index>(k)];
-    const bool is_clear = without.seen[k - free.joints.size()].is_clear;
-    if (is_clear && std::abs(size) > with.joints[k].least) result->faults.push_back(with.joints[k].text(size));
+    const JointFault& fault = with.joints[k];
+    const Fault& seen = without.seen[k - free.joints.size()];
+    double& size = sizes[static_cast<Eigen::Index>(k)];
+    // A fault that the others explain as well is hardly there beside them.
+    if (!seen.is_clear || std::abs(size) <= std::max(fault.least, std::abs(seen.size) / 4)) continue;
+    for (std::size_t other = k + 1; fault.gives_with && other < with.joints.size(); ++other)
+      if (with.joints[other].gives_with == fault.gives_with)
+        size = std::hypot(size, std::exchange(sizes[static_cast<Eigen::Index>(other)], 0));
+    result->faults.push_back(fault.text(size));
   }
   return result;
 }

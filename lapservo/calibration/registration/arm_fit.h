@@ -58,7 +58,7 @@ class ArmModel {
  private:
   JointRecording behind_backlash(const Eigen::VectorXd& x) const;
   void add_unknowns(double delay_s, const ArmFaults& faults);
-  Rigid3 camera_from_rcm_at(const Eigen::VectorXd& x, double time_s) const;
+  Rigid3 camera_from_rcm_at(const Eigen::VectorXd& x, double time_s, const std::array<double, 4>& at) const;
   Eigen::Matrix<double, 6, 1> difference(const TimedPose& pose, const Rigid3& camera_from_rcm, const JointVector& q,
                                          const Eigen::VectorXd& x) const;
 
@@ -66,6 +66,7 @@ class ArmModel {
   std::vector<TimedPose> poses_;
   JointRecording recording_;
   ArmGuess guess_;
+  std::array<double, 4> middle_{};
   std::vector<std::size_t> moving_;
   std::vector<JointFault> faults_;
   std::vector<Unknown> unknowns_;

@@ -63,6 +63,14 @@ JointFault coupling_fault(const Joints& joints, std::size_t j, std::size_t by) {
           is_length(j) ? 1e-5 : 1e-4};
 }
 
+JointFault incision_fault(const std::string& name, std::size_t j, int along) {
+  const auto text = [=](double size) {
+    return fmt::format("the incision gives: the RCM moves with {}, by {:.2g} mm/rad: swing with less force, less far",
+                       name, 1e3 * std::abs(size));
+  };
+  return {.text = text, .mend = {}, .step = 1e-4, .least = 3e-4, .gives_with = j, .along = along};
+}
+
 JointFault lag_fault(const std::string& name, std::size_t j) {
   return {[=](double size) {
             return fmt::format("the readings of {} are {:.0f} ms {} than the other joints': stamp all joints alike",
@@ -173,6 +181,7 @@ std::vector<JointFault> sized_joint_faults(const Joints& joints, const std::vect
     faults.push_back(scale_fault(joints.names[j], j)), faults.push_back(lag_fault(joints.names[j], j));
     for (std::size_t by = 0; by < 4; ++by)
       if (by != j && !is_length(by)) faults.push_back(coupling_fault(joints, j, by));
+    for (int along = 0; j < 2 && along < 3; ++along) faults.push_back(incision_fault(joints.names[j], j, along));
   }
   faults.push_back(clock_fault(poses)), faults.push_back(focal_fault());
   const double first_s = poses.front().time_s, span_s = poses.back().time_s - first_s;
