@@ -84,6 +84,24 @@ JointFault lag_fault(const std::string& name, std::size_t j) {
           1e-3};
 }
 
+// To second order: to the first one, a filter is a delay.
+JointFault filter_fault() {
+  constexpr double apart_s = 0.2;  // shorter, the noise of readings would count
+  return {[](double size) {
+            return fmt::format("a filter of about {:.0f} ms lies between joints and readings: record them unfiltered",
+                               1e3 * std::sqrt(2 * std::abs(size)));
+          },
+          [](JointRecording& r, double size) {
+            const JointRecording is = r;
+            for (std::size_t i = 0; i < is.joints.size(); ++i) {
+              const auto before = is.at(is.time_s[i] - apart_s), after = is.at(is.time_s[i] + apart_s);
+              for (std::size_t j = 0; before && after && j < 4; ++j)
+                r.joints[i][j] -= size * ((*before)[j] - 2 * is.joints[i][j] + (*after)[j]) / (apart_s * apart_s);
+            }
+          },
+          1e-5};
+}
+
 // Sizes for the usual rates of cameras and of folders.
 std::vector<double> clock_starts(double images_per_s) {
   std::vector<double> starts{0};
@@ -183,7 +201,7 @@ std::vector<JointFault> sized_joint_faults(const Joints& joints, const std::vect
       if (by != j && !is_length(by)) faults.push_back(coupling_fault(joints, j, by));
     for (int along = 0; j < 2 && along < 3; ++along) faults.push_back(incision_fault(joints.names[j], j, along));
   }
-  faults.push_back(clock_fault(poses)), faults.push_back(focal_fault());
+  faults.push_back(clock_fault(poses)), faults.push_back(focal_fault()), faults.push_back(filter_fault());
   const double first_s = poses.front().time_s, span_s = poses.back().time_s - first_s;
   for (int part = 1; part < parts; ++part)
     faults.push_back(lost_frames_fault(first_s + span_s * part / parts, delay_s));
