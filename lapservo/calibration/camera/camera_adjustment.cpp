@@ -138,14 +138,14 @@ constexpr Eigen::Index board_faults = 4, view_faults = 5;
 
 // Slopes of a residual by the faults of the board, then by those of its view.
 Eigen::Matrix<double, 1, board_faults + view_faults> slopes_of(const EdgeCost& cost, const CameraUnknowns& c,
-                                                               const ViewUnknowns& view, double board_m,
+                                                               const ViewUnknowns& view, const Eigen::Vector2d& board_m,
                                                                double height_px) {
   const auto by_point = [&](const Eigen::Vector3d& step_m) {
     EdgeCost moved = cost;
     moved.point.point_m += step_m;
     return moved.residual(c, view) - cost.residual(c, view);
   };
-  const Eigen::Vector2d at_px = cost.projected(c, view), at = cost.point.point_m.head<2>() / board_m;
+  const Eigen::Vector2d at_px = cost.projected(c, view), at = 2 * cost.point.point_m.head<2>().cwiseQuotient(board_m);
   const Eigen::Vector2d& normal = cost.point.normal;
   const double row = at_px.y() / height_px, step = 1e-5;
   const auto bent = [&](double part) { return by_point({0, 0, step * part}) / step; };
@@ -161,9 +161,9 @@ using Costs = std::vector<std::vector<EdgeCost>>;  // by view
 
 Departures departures_at(ceres::Problem& problem, const FittedNumbers& fitted, const Costs& costs,
                          const CameraUnknowns& c, const std::vector<ViewUnknowns>& views, double height_px) {
-  double board_m = 1e-6;
+  Eigen::Vector2d board_m(1e-6, 1e-6);  // so that a size of a bent board is its sag
   for (const auto& view : costs)
-    for (const EdgeCost& cost : view) board_m = std::max(board_m, cost.point.point_m.norm());
+    for (const EdgeCost& cost : view) board_m = board_m.cwiseMax(cost.point.point_m.head<2>().cwiseAbs());
   LinearFit fit = linear_fit(problem, fitted);
   fit.unmodelled_sigmas = unmodelled_sigmas, fit.most_seen = 12;
   Eigen::MatrixXd slopes =

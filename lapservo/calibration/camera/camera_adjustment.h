@@ -31,7 +31,7 @@ struct CameraFreedom {
 struct CameraFault {
   enum class Kind { zoom, centre, rolling_shutter, bent_board, stretched_board } kind;
   std::size_t view = 0;  ///< of the first three, which may be there in one view
-  double size = 0;       ///< relative, px, px over the image's height, m at the board's edge, relative
+  double size = 0;       ///< relative, px, px over the image's height, the sag in m, relative
 };
 
 struct CameraAdjustment {

@@ -169,10 +169,10 @@ std::string text_of(CameraFault::Kind kind, double size, const std::string& wher
           "both still",
           where, std::abs(size));
     case CameraFault::Kind::bent_board:
-      return fmt::format("the board is bent by {:.2g} mm: mount it on a flat plate", 1e3 * std::abs(size));
+      return fmt::format("the board is bent and sags by {:.2g} mm: mount it on a flat plate", 1e3 * std::abs(size));
     case CameraFault::Kind::stretched_board:
-      return fmt::format("the board's squares are {:+.2g} % wider than high: print it without scaling, and flat",
-                         100 * size);
+      return fmt::format("the board's squares are {:.2g} % {} than high: print it without scaling, and flat",
+                         100 * std::abs(size), size > 0 ? "wider" : "narrower");
   }
   return {};
 }
