@@ -157,14 +157,6 @@ std::vector<JointDeparture> joint_departures() {
                        pose.marker.camera_from_marker.translation += 1e-3 * p * turn_rad / 0.18 * by_m;
                      }
                    }});
-    all.push_back({"readings filtered, 0.1 s" + times, "a filter of", [=](Swing& swing) {
-                     JointRecording& r = swing.joints;
-                     for (std::size_t i = 1; i < r.joints.size(); ++i)
-                       for (std::size_t j = 0; j < 4; ++j)
-                         r.joints[i][j] =
-                             r.joints[i - 1][j] + 0.02 / (0.1 * p + 0.02) * (r.joints[i][j] - r.joints[i - 1][j]);
-                     for (double& time_s : r.time_s) time_s -= 0.1 * p;
-                   }});
   }
   all.push_back({"yaw and pitch exchanged", "exchanged", rows([](auto& at) { std::swap(at[0], at[1]); })});
   all.push_back({"yaw and roll exchanged", "exchanged", rows([](auto& at) { std::swap(at[0], at[3]); })});

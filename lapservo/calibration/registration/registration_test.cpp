@@ -243,6 +243,24 @@ TEST(RegisterArm, NamesNoCauseThatTheFramesOwnErrorsExplain) {
   EXPECT_TRUE(has(registered_from_names(poor).refusal, "as the frames' own sigmas allow"));
 }
 
+TEST(RegisterArm, NamesAnIncisionThatGivesAndAFilterOfTheReadings) {
+  const Motion motion{.wave = irregular(2)};
+  Recorded given = recorded(motion), filtered = given;
+  const Rigid3 truth = *given.truth.camera_from_rcm;
+  for (TimedPose& pose : given.poses)
+    pose.marker.camera_from_marker.translation += (motion_at(pose.time_s - motion.delay_s, motion).phi_rad - 1.45) *
+                                                  (truth.rotation * Eigen::Vector3d(1.1e-3, 2.2e-3, 2.7e-3));
+  auto& joints = filtered.recording.joints;
+  for (std::size_t i = 1; i < joints.size(); ++i)  // by 50 ms
+    for (std::size_t j = 0; j < 4; ++j) joints[i][j] = joints[i - 1][j] + (joints[i][j] - joints[i - 1][j]) / 6;
+  for (const auto& [data, words] : {std::pair(given, "the RCM moves with pitch"), std::pair(filtered, "a filter of")}) {
+    const auto found = registered_from_names(data);
+    EXPECT_TRUE(!found.faults.empty() && has(found.faults.front(), words)) << words << found.refusal;
+    const Eigen::Vector3d off_m = found.camera_from_rcm.translation - truth.translation;
+    EXPECT_LT(off_m.cwiseQuotient(found.sigma_translation_m).norm(), 4) << words;
+  }
+}
+
 TEST(RegisterArm, RefusesWhatCanNotTell) {
   EXPECT_TRUE(has(registered_from_names(recorded({.swing = {0.01, 0.01, 0.01, 0.01}})).refusal, "swing"));
   const Recorded data = recorded({});
