@@ -146,9 +146,8 @@ std::vector<JointDeparture> joint_departures() {
     all.push_back({with("pitch by 1.1, roll + 0.2 yaw"), "",
                    rows([=](auto& at) { at[1] *= 1 + 0.1 * p, at[3] += 0.2 * p * at[0]; })});
   }
-  for (const double p : {1.0, 0.3}) {
-    const std::string times = " x " + std::to_string(p).substr(0, 4);
-    all.push_back({"RCM moves with pitch, 1 mm" + times, "the incision gives", [=](Swing& swing) {
+  for (const double p : {1.0, 0.3})
+    all.push_back({"RCM moves, mm: " + std::to_string(p).substr(0, 4), "the incision gives", [=](Swing& swing) {
                      const Instrument& arm = swing.truth.instruments[0];
                      const Eigen::Vector3d by_m = arm.camera_from_rcm->rotation * Eigen::Vector3d(0.3, 0.6, 0.74);
                      for (TimedPose& pose : swing.poses) {
@@ -157,7 +156,6 @@ std::vector<JointDeparture> joint_departures() {
                        pose.marker.camera_from_marker.translation += 1e-3 * p * turn_rad / 0.18 * by_m;
                      }
                    }});
-  }
   all.push_back({"yaw and pitch exchanged", "exchanged", rows([](auto& at) { std::swap(at[0], at[1]); })});
   all.push_back({"yaw and roll exchanged", "exchanged", rows([](auto& at) { std::swap(at[0], at[3]); })});
   all.push_back({"roll wraps", "wraps", rows([](auto& at) { at[3] = wrap_pi(at[3]); })});

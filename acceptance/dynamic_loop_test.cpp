@@ -209,17 +209,6 @@ TEST(DynamicLoop, HoldsWithin100MsOfAPictureThatFreezes) {
   }
 }
 
-TEST(DynamicLoop, SaysThatAJointDoesNotFollow) {
-  DynamicLoop loop;
-  loop.meddle = [](double time_s, MujocoArm& arm) {
-    if (std::abs(time_s - 4) < 1e-3) arm.block(2);
-  };
-  const auto ticks = loop.run(papers, 8);
-  EXPECT_TRUE(std::any_of(ticks.begin(), ticks.end(), [](const DynamicTick& tick) {
-    return tick.time_s > 4 && tick.decision.control.reason == HoldReason::not_following;
-  }));
-}
-
 // Holds until an image gives the instrument's place; the rest is the desired motion of that time.
 TEST(DynamicLoop, AnEncoderThatIsSetIsFoundOut) {
   for (int joint = 0; joint < 4; ++joint) {

@@ -171,14 +171,13 @@ TEST(ImageResponse, SuspicionsThatEndByThemselvesHideNoFault) {
     const Eigen::Vector4d start = testing::random_start(rig, config, flaws, random);
     VisualController controller(config, testing::model_of(rig));
     TestSimulator simulator(rig, flaws, start, 1);
-    const Trajectory goal = trajectory_of(Goal::far, start);
     std::vector<Moment> moments;
-    for (int k = 0; k < 20; ++k) {
-      for (const Moment& moment : simulator.run(controller, goal, 0.25)) moments.push_back(moment);
-      controller.suspend(HoldReason::endoscope_moved);
-      for (const Moment& moment : simulator.run(controller, goal, 0.1)) moments.push_back(moment);
-      controller.resume();
-    }
+    for (int k = 0; k < 20; ++k)
+      for (const bool suspected : {false, true}) {
+        suspected ? controller.suspend(HoldReason::endoscope_moved) : controller.resume();
+        for (const Moment& moment : simulator.run(controller, trajectory_of(Goal::far, start), suspected ? 0.1 : 0.25))
+          moments.push_back(moment);
+      }
     const Outcome outcome = outcome_of(fault, moments);
     EXPECT_TRUE(outcome.named);
     EXPECT_LE(outcome.path, 1.001);

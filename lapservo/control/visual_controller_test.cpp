@@ -461,9 +461,8 @@ TEST(VisualController, APauseOfTheJointsFreezesNoPicture) {
 // The first image after a pause was taken before it, and has the stamp of its arrival.
 TEST(VisualController, AnImageThatAPauseKeptBackIsNoFault) {
   constexpr double from_s = 5;
-  for (const double pause_s : {0.3, 0.4, 0.6}) {
+  for (const double to_s : {5.3, 5.4, 5.6}) {
     Flaws flaws = usual_flaws();
-    const double to_s = from_s + pause_s;
     flaws.spoil = [=](ImageMeasurement image) {
       if (image.time_s > from_s && image.time_s < to_s) image.time_s = to_s;
       return image;
@@ -472,15 +471,13 @@ TEST(VisualController, AnImageThatAPauseKeptBackIsNoFault) {
     Sinusoids fast = paper_sinusoids();
     fast.omega_rad_s.setConstant(1);
     for (const Moment& m : run(flaws, sinusoids(fast), to_s + 2, 1))
-      EXPECT_NE(m.step.reason, HoldReason::image_not_following) << pause_s << ' ' << m.time_s;
+      EXPECT_NE(m.step.reason, HoldReason::image_not_following) << to_s << ' ' << m.time_s;
   }
 }
 
-// Another buffer, or another way through the network.
 TEST(VisualController, ADelayThatChangesIsForgottenAndFoundAnew) {
   constexpr double at_s = 12, noticed_s = 5, found_s = 8;
   for (const auto& [before_s, after_s] : {std::pair(0.05, 0.2), {0.2, 0.05}, {0.08, 0.13}}) {
-    SCOPED_TRACE(after_s);
     Flaws flaws = usual_flaws();
     flaws.delay_known = false, flaws.latency_s = before_s;
     flaws.spoil = [=, changed_s = after_s - before_s](ImageMeasurement image) {
