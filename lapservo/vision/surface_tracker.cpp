@@ -31,8 +31,9 @@ SurfaceTracker::SurfaceTracker(const Rig& rig, const TrackerOptions& options)
 
 void SurfaceTracker::forget(std::size_t i) {
   Tracked& it = tracked_[i];
-  it.memory.reset(), it.lost.reset(), it.beside.clear();
-  it.seen_before = {}, it.search = MarkerSearch();
+  it.memory.reset(), it.beside.clear();
+  it.seen_before = {};
+  it.search = MarkerSearch();
 }
 
 void SurfaceTracker::disregard_frame(std::size_t i) {
@@ -146,8 +147,9 @@ Found SurfaceTracker::follow_known(const ImageView& image, const LightImage& lig
 
 // Whether it is not found, or misses the well known RCM: another one may pass through that.
 bool SurfaceTracker::is_lost(const Tracked& it) {
-  if (!it.found.fit || it.found.fit->unknowns.through_rcm()) return !it.found.fit;
-  return it.registration && it.registration->is_within(it.instrument.marker.radius_m());
+  const std::optional<RcmPrior>& rcm = it.registration;
+  return !it.found.fit ||
+         (rcm && rcm->is_within(it.instrument.marker.radius_m()) && !it.found.fit->unknowns.through_rcm());
 }
 
 // Whether some were found.
@@ -173,8 +175,6 @@ bool SurfaceTracker::look_for_lost(const ImageView& image, const LightImage& lig
     if (misses_rcm && !found.fit) continue;
     if (misses_rcm) it.memory.reset(), it.seen_before = {}, it.cover.clear(), it.beside = others_;
     it.found = std::move(found);
-    if (it.found.fit && it.lost && may_be_another(scene_of(image, it), *it.lost, *it.found.fit, now_s_))
-      it.found = {Status::ambiguous, {}, it.found.fit->unknowns.pose()};
   }
   return any;
 }
@@ -190,7 +190,6 @@ void SurfaceTracker::find(const ImageView& image, const LightImage& light, WorkB
   for (Tracked& it : tracked_) {
     if (it.found.fit) continue;
     next_frame_ |= it.memory.has_value();
-    if (it.memory && options_.frame_budget) it.lost = it.memory;  // without a budget, frames need not be consecutive
     it.memory.reset(), it.cover.clear();
   }
   if (std::ranges::none_of(tracked_, is_lost)) return;

@@ -48,7 +48,7 @@ class SurfaceTracker {
     const Instrument& instrument;
     const std::array<std::uint8_t, 3>& bands;  // their colour classes
     std::optional<RcmPrior> registration;
-    std::optional<InstrumentMemory> memory{}, lost{};       // of the frame before, and of the last before a loss
+    std::optional<InstrumentMemory> memory{};
     PrintRecord print{}, print_before{};                    // with this frame's evidence, and without it
     std::array<std::optional<ShaftPose>, 2> seen_before{};  // found or refused in the two frames before
     MarkerSearch search{};

@@ -294,29 +294,6 @@ TEST(SurfaceTracker, OfTwoOfTheSamePrintTheOneThroughTheRcmCounts) {
   EXPECT_GE(strayed, 9) << "the test's own power";
 }
 
-// Another one that shows meanwhile is not the instrument's, before that can have moved there.
-TEST(SurfaceTracker, OfTwoOfTheSamePrintTheOtherIsNoneThatWasLost) {
-  Rig both = scenes::usual_rig(2), other = both;
-  both.instruments[1].marker = both.instruments[0].marker;
-  other.instruments = {both.instruments[1]};
-  int moved = 0;
-  for (std::uint64_t seed = 1; seed <= 2; ++seed)
-    for (const bool registered : {true, false}) {
-      SCOPED_TRACE("seed " + std::to_string(seed) + (registered ? ", registered" : ""));
-      Random random(seed);
-      const auto q = apart(both, random);
-      const cv::Mat own = scenes::render(scenes::usual_rig(), {q[0]}, seed), shows = scenes::render(both, q, seed),
-                    hidden = scenes::render(other, {q[1]}, seed);
-      Tracker tracker(registered ? scenes::usual_rig() : scenes::without_rcm(scenes::usual_rig()));
-      EXPECT_EQ(tracker.track(own)[0].status, Status::ok);
-      for (int i = 0; i < 3; ++i) EXPECT_NE(tracker.track(hidden)[0].status, Status::ok);
-      for (int i = 0; i < 3; ++i) EXPECT_EQ(tracker.track(shows)[0].status == Status::ok, registered);
-      for (int i = 0; i < 32; ++i) tracker.track(hidden);
-      moved += tracker.track(hidden)[0].status == Status::ok;
-    }
-  EXPECT_GE(moved, 3) << "the test's own power";
-}
-
 // A rig a few millimetres off looks like a misprint: what needs no registration is given all the same.
 TEST(SurfaceTracker, AContradictedRegistrationIsNoMismatchedMarkerWithinABudget) {
   int contradicted = 0;

@@ -66,9 +66,9 @@ bool are_rivals(const FineFit& fit, const FineFit& other) {
 }
 
 // No marker moves farther from frame to frame.
-double reach_px(const Scene& scene) {
+double reach_px(const SearchFrame& frame) {
   constexpr double of_width = 0.05;
-  return of_width * scene.image.width_px;
+  return of_width * frame.scene.image.width_px;
 }
 
 double cost_of_starts(const SearchFrame& frame, bool through_rcm) {
@@ -87,11 +87,17 @@ Found detect_in_blob(const SearchFrame& frame, bool through_rcm, const Blob& blo
   Found best;
   bool has_rivals = false;
   const std::size_t first = walk.start();
-  if (!budget.allows(cost_of_starts(frame, through_rcm) + costs.try_start())) return walk.stop(blob, first), best;
+  if (!budget.allows(cost_of_starts(frame, through_rcm) + costs.try_start())) {
+    walk.stop(blob, first);
+    return best;
+  }
   const auto [starts, rivals, other_bands] = starts_in(frame, through_rcm, blob, budget);
   walk.other_bands |= other_bands;
   for (std::size_t i = first; i < starts.size() && (i < rivals || !best.fit); ++i) {
-    if (i > first && i >= rivals && !budget.allows(costs.try_start())) return walk.stop(blob, i), best;
+    if (i > first && i >= rivals && !budget.allows(costs.try_start())) {
+      walk.stop(blob, i);
+      return best;
+    }
     Found found = try_start(frame.scene, frame.light, starts[i], budget);
     if (!found.fit) {
       // A misprint is no reason to look for the marker elsewhere, with a boundary less.
@@ -106,17 +112,14 @@ Found detect_in_blob(const SearchFrame& frame, bool through_rcm, const Blob& blo
   return has_rivals ? refusal(Status::ambiguous, best.fit->unknowns) : best;
 }
 
-double distance_px(const Scene& scene, const PoseUnknowns& one, const PoseUnknowns& other) {
-  const auto middle_px = [&](const PoseUnknowns& unknowns) {
-    return scene.camera.raw_from_point(point_on_axis(unknowns.pose(), scene.marker.length_m() / 2));
-  };
-  return (middle_px(other) - middle_px(one)).norm();
-}
-
 // Places within a radius are one.
 bool are_apart(const Scene& scene, const PoseUnknowns& one, const PoseUnknowns& other) {
-  const double depth_m = one.pose().camera_from_unrolled.translation.norm();
-  return distance_px(scene, one, other) > scene.marker.radius_m() / depth_m * scene.camera.fx_px;
+  const auto middle = [&](const PoseUnknowns& unknowns) {
+    return scene.camera.raw_from_point(point_on_axis(unknowns.pose(), scene.marker.length_m() / 2));
+  };
+  const double radius_px =
+      scene.marker.radius_m() / one.pose().camera_from_unrolled.translation.norm() * scene.camera.fx_px;
+  return (middle(other) - middle(one)).norm() > radius_px;
 }
 
 // `beside` a marker neither that, nor a misprint, nor one that misses the RCM counts.
@@ -127,11 +130,14 @@ Found detect(const SearchFrame& frame, bool through_rcm, BlobWalk& walk, WorkBud
     return found.fit && found.fit->unknowns.through_rcm() && are_apart(frame.scene, *beside, found.fit->unknowns);
   };
   Found best;
-  for (const Blob* blob : walk.rest(frame.blobs, reach_px(frame.scene))) {
+  for (const Blob* blob : walk.rest(frame.blobs, reach_px(frame))) {
     Found found = detect_in_blob(frame, through_rcm, *blob, walk, budget);
-    walk.done = counts(found);
-    if (walk.done || (!beside && best.status == Status::no_marker)) best = std::move(found);
-    if (walk.done || walk.stopped()) return best;
+    if (counts(found)) {
+      walk.done = true;
+      return found;
+    }
+    if (!beside && best.status == Status::no_marker) best = std::move(found);
+    if (walk.stopped()) return best;
   }
   walk.done = true;
   return best;
@@ -146,8 +152,8 @@ std::optional<bool> has_rival(const SearchFrame& frame, const FineFit& fit, Work
       if (!are_apart(scene, fit.unknowns, start)) continue;
       if (!budget.allows(costs.try_start())) return std::nullopt;
       const Found other = try_start(scene, frame.light, start, budget);
-      const bool fits = other.fit && are_apart(scene, fit.unknowns, other.fit->unknowns);
-      if (fits || other.status == Status::marker_mismatch) return true;
+      if (other.status == Status::marker_mismatch) return true;
+      if (other.fit && are_apart(scene, fit.unknowns, other.fit->unknowns)) return true;
     }
   return false;
 }
@@ -162,11 +168,6 @@ Found follow(const Scene& scene, const LightImage& light, const PoseUnknowns& st
     if (Found found = fitted_from(scene, light, coarse.unknowns, expected, budget); found.fit) return found;
   if (!scene.registration || !start.through_rcm()) return near;
   return fitted_from(scene, light, start.with_rcm(false), expected, budget);
-}
-
-bool may_be_another(const Scene& scene, const InstrumentMemory& last, const FineFit& fit, double now_s) {
-  const double frames = (now_s - last.time_s) / FrameClock::usual_period_s;
-  return !fit.unknowns.through_rcm() && distance_px(scene, last.fit.unknowns, fit.unknowns) > frames * reach_px(scene);
 }
 
 // The candidate as it shows in this frame; whether it doesn't.
@@ -242,7 +243,7 @@ bool MarkerSearch::finish_agreement(const SearchFrame& frame, WorkBudget& budget
 // The best of all that the starts on lines through the RCM lead to.
 Found MarkerSearch::hidden(const SearchFrame& frame, WorkBudget& budget) {
   const std::vector<Blob> blobs = joined_blobs(frame.blobs);
-  const auto rest = hidden_.rest(blobs, reach_px(frame.scene));
+  const auto rest = hidden_.rest(blobs, reach_px(frame));
   if (agreement_ && !finish_agreement(frame, budget)) return {};
   for (const Blob* blob : rest) {
     const auto starts = starts_in(frame, true, *blob, budget).poses;
@@ -293,7 +294,8 @@ Found MarkerSearch::look_with_rcm(const SearchFrame& frame, WorkBudget& budget) 
   budget.allow(longs_turn_ ? step : WorkBudget::Beyond::none);
   Found found = look_long(frame, is_mismatch, plain_is_known, budget);
   if (found.fit || hidden_.done) begin_anew(found.fit ? Status::no_marker : status_);
-  return found.fit || plain.status == Status::no_marker ? found : plain;
+  if (found.fit || plain.status == Status::no_marker) return found;
+  return plain;
 }
 
 Found MarkerSearch::look_beside(const PoseUnknowns& missing, const SearchFrame& frame, WorkBudget& budget) {

@@ -5,7 +5,6 @@
 
 #include "lapservo/geometry/rigid3.h"
 #include "lapservo/vision/colour/blob_search.h"
-#include "lapservo/vision/decision/instrument_memory.h"
 #include "lapservo/vision/image/light_image.h"
 #include "lapservo/vision/model/fine_fit.h"
 #include "lapservo/vision/search/agreement_search.h"
@@ -35,9 +34,6 @@ struct SearchFrame {
 /// The marker near where it is expected, at last without regard to the registration.
 Found follow(const Scene& scene, const LightImage& light, const PoseUnknowns& start, const Expected& expected,
              WorkBudget& budget);
-
-/// Whether a marker that was followed last so can't have moved to that fit, which no RCM shows to be of the same one.
-bool may_be_another(const Scene& scene, const InstrumentMemory& last, const FineFit& fit, double now_s);
 
 /// Looks for one marker all over a frame: first for what shows plainly, of a well known RCM on lines through it, else
 /// by the blobs' outlines; of a well known RCM then without regard to it, and at last for markers that are hidden in
