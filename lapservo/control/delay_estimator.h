@@ -40,7 +40,7 @@ class DelayEstimator {
   /// The image stamped t shows the joints at t - delay.
   std::optional<DelayEstimate> estimate() const;
 
-  /// Another delay than this one explains the images better, beyond doubt and by more than an estimate may err.
+  /// Another delay than this one explains the images better: by four sigmas, and four times the largest of estimate().
   bool contradicts(double delay_s) const;
 
   /// No delay makes images and joints agree, although the joints' motion would determine it several times over.

@@ -32,7 +32,7 @@ Eigen::Vector4d instrument(const std::array<Backlash, 4>& backlashes, const Eige
   return q;
 }
 
-// Of the last seconds: whether the delay is still the one that all images gave.
+// The last seconds show whether the delay is still the one that all images gave.
 DelayEstimatorConfig of_the_newest(DelayEstimatorConfig config) {
   constexpr double part = 0.15;
   config.forgetting_s *= part;

@@ -184,7 +184,7 @@ HoldReason VisualController::update(const ImageMeasurement& image) {
   if (image.time_s - now_s_ > most_ahead_s) return HoldReason::bad_time;
   // A repeated or older stamp carries no information: the age of the last measurement goes on growing.
   if (image_s_ && image.time_s <= *image_s_) return image_reason_;
-  // Of images that a pause kept back the stamps of arrival are late.
+  // Images that a pause kept back may carry the times at which they arrived.
   if (image_s_ && image.time_s - *image_s_ > config_.stale_after_s) images_from_s_ = image.time_s;
   image_s_ = image.time_s;
   constexpr double compared_s = 0.3;

@@ -132,12 +132,9 @@ Found detect(const SearchFrame& frame, bool through_rcm, BlobWalk& walk, WorkBud
   Found best;
   for (const Blob* blob : walk.rest(frame.blobs, reach_px(frame))) {
     Found found = detect_in_blob(frame, through_rcm, *blob, walk, budget);
-    if (counts(found)) {
-      walk.done = true;
-      return found;
-    }
-    if (!beside && best.status == Status::no_marker) best = std::move(found);
-    if (walk.stopped()) return best;
+    walk.done = counts(found);
+    if (walk.done || (!beside && best.status == Status::no_marker)) best = std::move(found);
+    if (walk.done || walk.stopped()) return best;
   }
   walk.done = true;
   return best;
@@ -152,8 +149,8 @@ std::optional<bool> has_rival(const SearchFrame& frame, const FineFit& fit, Work
       if (!are_apart(scene, fit.unknowns, start)) continue;
       if (!budget.allows(costs.try_start())) return std::nullopt;
       const Found other = try_start(scene, frame.light, start, budget);
-      if (other.status == Status::marker_mismatch) return true;
-      if (other.fit && are_apart(scene, fit.unknowns, other.fit->unknowns)) return true;
+      const bool fits = other.fit && are_apart(scene, fit.unknowns, other.fit->unknowns);
+      if (fits || other.status == Status::marker_mismatch) return true;
     }
   return false;
 }
