@@ -57,9 +57,8 @@ void DelayEstimator::add(double stamp_s, const Eigen::Vector4d& q_image, const E
 // products gives the same fit.
 double DelayEstimator::variance_by_model(const Lowest& at) const {
   constexpr Eigen::Index faults = 16, all = faults + 2;
-  const auto [candidate, shift_s, delay_s, by_noise_s2] = at;
-  const Candidate &left = grid_[candidate - 1], &centre = grid_[candidate], &right = grid_[candidate + 1];
-  const double curvature = (left.squares - 2 * centre.squares + right.squares) / (step_s * step_s);
+  const double curvature = at.curvature, shift_s = at.shift_s;
+  const Candidate &left = grid_[at.candidate - 1], &centre = grid_[at.candidate], &right = grid_[at.candidate + 1];
   const Eigen::Matrix4d by_delay = (right.mixed - left.mixed) / (2 * step_s), mixed = centre.mixed + shift_s * by_delay;
   Eigen::Matrix<double, all, all> products = Eigen::Matrix<double, all, all>::Zero();
   products(0, 0) = curvature / 2;
@@ -90,7 +89,7 @@ std::optional<DelayEstimator::Lowest> DelayEstimator::lowest() const {
   // A sum of squares grows by 1 at one sigma. A residual that the measured joints do not explain counts as noise that
   // persists over several frames.
   const double misfit = std::max(1.0, lowest->squares / (4 * weight_));
-  return Lowest{middle, shift_s, delay_s, 2 / curvature * misfit * frames_alike};
+  return Lowest{middle, curvature, shift_s, delay_s, 2 / curvature * misfit * frames_alike};
 }
 
 std::optional<DelayEstimate> DelayEstimator::estimate() const {

@@ -52,10 +52,11 @@ class DelayEstimator {
     double squares = 0;
     Eigen::Matrix4d mixed = Eigen::Matrix4d::Zero();  ///< the weighted rest by where the joints are
   };
-  /// The lowest sum of squares, between its candidate and a neighbour, and its variance by noise.
+  /// The lowest sum of squares, between its candidate and a neighbour, and its variance by noise; of the squares, their
+  /// curvature by the delay.
   struct Lowest {
     std::size_t candidate;
-    double shift_s, delay_s, by_noise_s2;
+    double curvature, shift_s, delay_s, by_noise_s2;
   };
   /// nullopt before min_time_s, and where all delays are alike.
   std::optional<Lowest> lowest() const;

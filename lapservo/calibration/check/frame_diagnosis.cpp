@@ -173,15 +173,12 @@ class OtherReadings {
     return "";
   }
 
-  // Also of a print that is not calibrated yet: with the tolerance of calibrate colour.
   std::string other_diameter() const {
-    constexpr double tolerance_m = 0.15e-3;
     for (const auto& [times, text] : {std::pair{2.0, "twice"}, {0.5, "half"}})
       for (const Instrument& instrument : rig_.instruments) {
-        const double diameter_m = times * instrument.marker.diameter_m;
         Instrument other = instrument;
-        other.marker.diameter_m = diameter_m;
-        other.marker.tolerance_m = std::max(other.marker.tolerance_m, tolerance_m);
+        const double diameter_m = other.marker.diameter_m *= times;
+        other.marker.tolerance_m = std::max(other.marker.tolerance_m, uncalibrated_tolerance_m);
         if (found_with_rig([&](Rig& rig) { rig.instruments = {other}; }))
           return fmt::format(
               "{} is found with a diameter of {:.2f} mm, {} the rig's: diameter_m is the diameter, by callipers, and "

@@ -23,6 +23,9 @@ constexpr bool comes_by_compression(Status status) {
   return status == Status::poor_fit || status == Status::uncertain || status == Status::ambiguous;
 }
 
+/// Tolerance with which a print that is not calibrated yet is looked for: it is not to hide the marker.
+inline constexpr double uncalibrated_tolerance_m = 0.15e-3;
+
 /// Frames that show an instrument, and those of them whose shaft misses the rig's RCM.
 struct MissedRcm {
   int shown = 0;                 ///< frames that show it

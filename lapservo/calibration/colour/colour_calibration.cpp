@@ -30,11 +30,9 @@ constexpr double max_sigma_deg = 12;                           // the largest th
 constexpr int frames_alike = 4;                                // whose light and place err alike
 
 Rig with_hues(Rig rig, std::size_t instrument, const std::array<double, 3>& hues_deg) {
-  // A print or a registration that are off are not to hide the marker.
-  constexpr double tolerance_m = 0.15e-3;
   for (Instrument& of : rig.instruments) of.camera_from_rcm.reset();
   Marker& marker = rig.instruments[instrument].marker;
-  marker.hues_deg = hues_deg, marker.tolerance_m = std::max(marker.tolerance_m, tolerance_m);
+  marker.hues_deg = hues_deg, marker.tolerance_m = std::max(marker.tolerance_m, uncalibrated_tolerance_m);
   return rig;
 }
 

@@ -30,6 +30,8 @@ ArmModel::ArmModel(const Instrument& instrument, const ArmStart& start, const Jo
     if ((*high)[j] - (*low)[j] > least_travel[j]) moving_.push_back(j);
     middle_[j] = (start.ranges.low[j] + start.ranges.high[j]) / 2;
   }
+  const auto q = JointVector::from_vector(q_from_joints(guess_.joints, Eigen::Vector4d(middle_.data())));
+  rcm_from_middle_ = rcm_from_unrolled(q).rotation;
   add_unknowns(start.delay_s, faults);
 }
 
@@ -72,8 +74,7 @@ Rigid3 ArmModel::camera_from_rcm_at(const Eigen::VectorXd& x, double time_s, con
   for (std::size_t k = 0; k < faults_.size(); ++k)
     if (const auto j = faults_[k].gives_with)
       given_m[faults_[k].along] += blocks_.joints.of(x)[static_cast<Eigen::Index>(k)] * (at[*j] - middle_[*j]);
-  const auto q = JointVector::from_vector(q_from_joints(guess_.joints, Eigen::Vector4d(middle_.data())));
-  camera_from_rcm.translation += camera_from_rcm.rotation * (rcm_from_unrolled(q).rotation * given_m);
+  camera_from_rcm.translation += camera_from_rcm.rotation * (rcm_from_middle_ * given_m);
   if (blocks_.drift.size == 0) return camera_from_rcm;
   const double first_s = poses_.front().time_s, span_s = std::max(1e-9, poses_.back().time_s - first_s);
   const double part = (time_s - first_s) / span_s - 0.5;

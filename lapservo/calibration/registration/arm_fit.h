@@ -66,7 +66,8 @@ class ArmModel {
   std::vector<TimedPose> poses_;
   JointRecording recording_;
   ArmGuess guess_;
-  std::array<double, 4> middle_{};
+  std::array<double, 4> middle_{};      ///< of the joints' motion
+  Eigen::Quaterniond rcm_from_middle_;  ///< of the unrolled frame there
   std::vector<std::size_t> moving_;
   std::vector<JointFault> faults_;
   std::vector<Unknown> unknowns_;
