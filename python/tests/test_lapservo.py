@@ -445,4 +445,4 @@ def test_every_end_of_the_process_brakes_first(ending, sent, code):
     assert process.stdout.readline() == "moving\n"
     if sent:
         process.send_signal(sent)
-    assert process.communicate(timeout=120)[0] == "released\n" and process.returncode == code
+    assert process.stdout.read() == "released\n" and process.wait(timeout=120) == code
