@@ -198,6 +198,17 @@ TEST(Rendered, Rotation) {
   expect_rotation_figures(score_single(rendered_frames(set)));
 }
 
+// From plastic to steel and white.
+TEST(Rendered, ShaftsOfAnyGrey) {
+  Score all;
+  for (const float reflectance : {0.15F, 0.35F, 0.6F, 0.8F}) {
+    RenderedSet set = usual_set(61, 12);
+    set.shaft_reflectance = reflectance;
+    for (const TrueFrame& frame : rendered_frames(set)) all.add(frame, Tracker(frame.rig).track(frame.bgr));
+  }
+  expect_rotation_figures(all);
+}
+
 TEST(Rendered, Stress) {
   std::map<std::string, RenderedSet> sets;
   for (const char* name : {"blood", "smoke", "dark", "bright", "defocus", "noise", "warm", "jpeg"})

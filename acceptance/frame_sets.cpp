@@ -150,6 +150,7 @@ std::vector<TrueFrame> rendered_frames(const RenderedSet& set) {
   for (const Instrument& instrument : rig.instruments) {
     ShaftModel shaft = shaft_of(instrument);
     shaft.blotches = blotches(instrument.marker, set.blood, random);
+    shaft.shaft_reflectance = set.shaft_reflectance;
     shafts.push_back(shaft);
   }
   Renderer renderer(rig.camera, shafts, tissue, set.options);

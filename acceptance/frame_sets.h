@@ -69,6 +69,7 @@ struct RenderedSet {
   std::vector<std::vector<JointVector>> configurations;  ///< per frame and instrument
   RenderOptions options;
   double blood = 0;  ///< fraction of the marker covered
+  float shaft_reflectance = ShaftModel{}.shaft_reflectance;
   std::uint64_t seed = 1;
   std::function<cv::Mat(const cv::Mat&)> after;  ///< what the recorder does, when given
 };

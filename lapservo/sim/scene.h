@@ -41,10 +41,11 @@ struct PrintedCells {
   static constexpr float bright_reflectance = 0.6F, dark_reflectance = 0.03F;
 };
 
-/// A shaft with its marker as a physical thing: the print on a film around a thinner black shaft with a rounded tip.
+/// A shaft with its marker as a physical thing: the print on a film around a thinner grey shaft with a rounded tip.
 struct ShaftModel {
   Marker marker;
   double film_m = 0.1e-3;
+  float shaft_reflectance = 0.023F;
   double shaft_before_m = 0.3;    ///< length of shaft shown on the proximal side
   double shaft_beyond_m = 0.012;  ///< and on the distal side, before the tip
   std::vector<Blotch> blotches;

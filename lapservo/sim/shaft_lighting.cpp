@@ -25,14 +25,14 @@ Lighting at_power(Lighting lighting, float power) {
   return lighting;
 }
 
-std::array<Light, 8> reflectances(const Marker& marker) {
+std::array<Light, 8> reflectances(const ShaftModel& shaft) {
   std::array<Light, 8> of_part;
   const auto set = [&](Part part, const Light& light) { of_part.at(static_cast<std::size_t>(part)) = light; };
   set(Part::nothing, Light::Zero());
-  set(Part::band_0, printed_colour(marker.hues_deg[0]));
-  set(Part::band_1, printed_colour(marker.hues_deg[1]));
-  set(Part::band_2, printed_colour(marker.hues_deg[2]));
-  set(Part::shaft, Light::Constant(0.023F));
+  set(Part::band_0, printed_colour(shaft.marker.hues_deg[0]));
+  set(Part::band_1, printed_colour(shaft.marker.hues_deg[1]));
+  set(Part::band_2, printed_colour(shaft.marker.hues_deg[2]));
+  set(Part::shaft, Light::Constant(shaft.shaft_reflectance));
   set(Part::film_edge, Light::Zero());  // that of the band there
   set(Part::tip, Light::Constant(0.2F));
   set(Part::blood, Light(0.012F, 0.008F, 0.11F));

@@ -49,7 +49,7 @@ class ShaftLighting {
 Lighting at_power(Lighting lighting, float power);
 
 /// Reflectance in linear light of each Part of a shaft.
-std::array<Light, 8> reflectances(const Marker& marker);
+std::array<Light, 8> reflectances(const ShaftModel& shaft);
 
 /// Reflectance in linear light of a printed hue: HSV(hue, 0.91, 0.84) in sRGB values, b g r.
 Light printed_colour(double hue_deg);

@@ -68,7 +68,7 @@ void blend(const Paint& paint, float depth_m, const cv::Vec3f& background, cv::V
 
 ShaftPainter::ShaftPainter(const ShaftModel& model, const ShaftPlacement& placement, const Lighting& lighting,
                            const Disc& tip)
-    : tracer_(model, placement), lighting_(lighting, tracer_), reflectances_(reflectances(model.marker)), tip_(tip) {
+    : tracer_(model, placement), lighting_(lighting, tracer_), reflectances_(reflectances(model)), tip_(tip) {
   if (model.cells.rows > 0) {
     reflectances_.at(static_cast<std::size_t>(Part::band_0)) = Light::Constant(PrintedCells::bright_reflectance);
     reflectances_.at(static_cast<std::size_t>(Part::band_2)) = Light::Constant(PrintedCells::dark_reflectance);

@@ -68,7 +68,7 @@ ChannelSteps channel_steps(const StepColumns& columns, const Raised& raised) {
     density[channel] = static_cast<double>(by_density / columns.density_square);
   }
   const auto blur_px = static_cast<double>(columns.blur_px);
-  ChannelSteps out{-blur_px * density / step, step};
+  ChannelSteps out{-blur_px * density / step - columns.edge.channel_px, step};
   // Specular light is white: it shows alone in a channel in which both sides of the edge look alike.
   Eigen::Index alike = 0;
   if (step.abs().minCoeff(&alike) < believed.least_step * step.abs().maxCoeff())

@@ -106,6 +106,7 @@ PooledEdge mean_of(std::span<const EdgePlace> places) {
     const Measurement& m = *place.measurement;
     edge.boundary = m.group;
     edge.residual_px += m.residual_px / edge.places;
+    edge.channel_px += Eigen::Map<const Eigen::Array3f>(m.channel_px.data()).cast<double>() / edge.places;
     edge.place_px += m.expected_px, edge.normal += m.normal;
     edge.clear_px = std::clamp(static_cast<int>(m.clear_px), 0, edge.clear_px);
     for (std::size_t c = 0; c < 3; ++c)

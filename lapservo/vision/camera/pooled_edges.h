@@ -20,6 +20,7 @@ struct PooledEdge {
   std::array<std::array<float, samples>, 3> value{};  ///< b, g, r
   int places = 0;
   Eigen::Vector2f place_px{0, 0}, normal{0, 0};  ///< of the places, their means
+  Eigen::Array3d channel_px{0, 0, 0};            ///< where b, g, r show the places from there: mean
   double residual_px = 0;                        ///< where the places were located, from where the pose has them: mean
   int clear_px = reach;  ///< so far on either side no other boundary shows, wherever it was located
 

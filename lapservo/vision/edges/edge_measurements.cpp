@@ -147,7 +147,7 @@ std::optional<BoundaryPlace> place_boundary(const Frame& frame, const Neighbourh
   BoundaryPlace place{};
   const Generatrix& generatrix = generatrices[1];
   place.facing = frame.facing(k, generatrix, along_m[k]);
-  place.film_shift = place.shows_film() ? film_edge_level(place.facing, film_edge_limits.usual_even_light) : 0;
+  place.film_shift = place.shows_film() ? usual_film_edge_level(place.facing) : 0;
   const double depth_m = place.film_shift * frame.film_m;
   const Eigen::Vector3d point = frame.point(generatrix, along_m[k]) - depth_m * generatrix.outwards;
   if (!frame.scene.field.contains(point)) return std::nullopt;
@@ -228,17 +228,22 @@ void see_film(const Frame& frame, std::size_t k, double even_light, const EdgeBl
   if (steps.points.size() < edge_limits.min_alike) return;
   InplaceVector<EndPoint, max_lines> points;
   for (const BoundaryPlace* place : steps.points) {
-    const float before = dot(place->edge.before, steps.sum), step = dot(place->edge.step, steps.sum);
-    points.push_back(k == 0 ? EndPoint{before, step} : EndPoint{-before - step, step});
+    const Eigen::Map<const Eigen::Vector3f> before(place->edge.before.data()), step(place->edge.step.data());
+    points.emplace_back().colwise() = before;
+    points[points.size() - 1].col(k == 0 ? 1 : 0) += step;
   }
-  const auto gloss = gloss_of(points);
+  const EndLight light(points);
   for (std::size_t i = 0; i < points.size(); ++i) {
     BoundaryPlace& place = *steps.points[i];
-    const double matt = film_edge_level(place.facing, even_light);
+    const double facing = film_edge_light(place.facing, even_light), matt = light.matt_level(facing);
     const double width_px = frame.film_m * place.film_px_per_m, blur_px = blur.along_px[k];
-    const FilmShift shift = film_shift(matt - gloss[i], std::abs(width_px) / blur_px);
+    const double width_blurs = std::abs(width_px) / blur_px;
+    const FilmShift shift = film_shift(matt - light.gloss_level(i), width_blurs);
     const double shift_px = shift.fraction * width_px;
     Measurement& m = place.measurement;
+    for (std::size_t c = 0; c < 3; ++c)
+      m.channel_px[c] =
+          static_cast<float>(film_shift(light.level(facing, i, c), width_blurs).fraction * width_px - shift_px);
     m.row[film_unknown] += (shift.by_width - place.film_shift) * film_sigma_m * place.film_px_per_m;
     place.film_moved_px = shift_px - place.film_shift * width_px;
     // The correction for specular light is no better known.

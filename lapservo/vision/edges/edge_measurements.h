@@ -56,6 +56,7 @@ struct Measurement {
   double along_px_per_m = 0;  ///< how it moves with the boundary's place along the shaft; 0 of sides
   double across = 0;          ///< of boundaries: from -1 to 1, from side to side of the shaft
   Eigen::Vector2f expected_px{0, 0}, normal{0, 0};  ///< where the pose has it, and the image normal; of sides inwards
+  std::array<float, 3> channel_px{};  ///< where b, g, r show it from there: in the light of the film's edge
   float clear_px = 0;  ///< of boundaries: how far along the normal no other boundary and its blur reaches
 };
 inline constexpr std::size_t measurement_groups = 6;

@@ -55,24 +55,48 @@ double usual_or_seen(std::span<const EvenLight> seen) {
   return std::clamp(sum / certainty, 0.0, film_edge_limits.most_even_light);
 }
 
-double film_edge_level(const Facing& facing, double even_light) {
+double film_edge_light(const Facing& facing, double even_light) {
   const auto lit = [even_light](double cosine) { return even_light + (1 - even_light) * std::max(0.0, cosine); };
-  const double light = std::min(lit(facing.film_edge) / lit(facing.outside), film_edge_limits.most_lit);
-  return light - (1 - light) * film_edge_limits.bare_shaft_light;
+  return std::min(lit(facing.film_edge) / lit(facing.outside), film_edge_limits.most_lit);
 }
 
-InplaceVector<double, max_end_points> gloss_of(std::span<const EndPoint> points) {
+double usual_film_edge_level(const Facing& facing) {
+  const double light = film_edge_light(facing, film_edge_limits.usual_even_light);
+  return light - (1 - light) * film_edge_limits.darkest_light;
+}
+
+EndLight::EndLight(std::span<const EndPoint> points) {
   constexpr double veil_quantile = 0.2;
-  InplaceVector<float, max_end_points> shafts;
-  for (const EndPoint& point : points) shafts.push_back(point.shaft);
-  InplaceVector<double, max_end_points> gloss;
-  if (points.empty()) return gloss;
-  const float veil = quantile(shafts, veil_quantile);
+  EndPoint sum = EndPoint::Zero(), unseen = sum;
   for (const EndPoint& point : points) {
-    const double beyond = std::max(0.0F, point.shaft - veil) / std::max(point.step, std::numeric_limits<float>::min());
-    gloss.push_back(std::min(beyond, film_edge_limits.most_gloss));
+    sum += point;
+    for (Eigen::Index c = 0; c < 3; ++c)  // both are 0 where all of a channel is saturated
+      if (point.row(c).isZero(0)) unseen.row(c).setConstant(std::numeric_limits<float>::infinity());
   }
-  return gloss;
+  Eigen::Index channel = 0, side = 0;
+  (sum + unseen).minCoeff(&channel, &side);
+  const Eigen::Vector3f step = sum.col(1) - sum.col(0);
+  const float size = std::max(step.norm(), std::numeric_limits<float>::min());
+  const float darkest = static_cast<float>(film_edge_limits.darkest_light) * step.cwiseAbs().maxCoeff() / size;
+  step_ = (step / size).cast<double>();
+  shaft_ = ((sum.col(0).array() - sum(channel, side)) / size + darkest).cast<double>();
+  InplaceVector<float, max_end_points> steps, specular;
+  for (const EndPoint& point : points) {
+    const float own = std::max(step.dot(point.col(1) - point.col(0)) / size, std::numeric_limits<float>::min());
+    steps.push_back(own);
+    specular.push_back(point(channel, side) - darkest * own);
+  }
+  const float veil = points.empty() ? 0 : quantile(InplaceVector(specular), veil_quantile);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const double beyond = std::max(0.0F, specular[i] - veil) / steps[i];
+    gloss_.push_back(std::min(beyond, film_edge_limits.most_gloss));
+  }
+}
+
+double EndLight::level(double light, std::size_t point, std::size_t channel) const {
+  const auto c = static_cast<Eigen::Index>(channel);
+  if (std::abs(step_[c]) < film_edge_limits.darkest_light) return matt_level(light) - gloss_level(point);
+  return light - ((1 - light) * shaft_[c] + gloss_[point]) / step_[c];
 }
 
 // A step of the same blur, by least squares: the fraction f of the width w solves (1 - s) P(f w) + s P((f - 1) w) = 1/2

@@ -3,6 +3,8 @@
 #include <cstddef>
 #include <span>
 
+#include <Eigen/Core>
+
 #include "lapservo/core/inplace_vector.h"
 
 namespace lapservo::internal {
@@ -15,9 +17,9 @@ struct FilmEdgeLimits {
   double most_lit = 3, usual_even_light = 0.1, even_light_sigma = 0.07, most_even_light = 0.4;
   double told_even_light_sigma = 0.03;
   std::size_t min_fading_points = 8;
-  /// Light of the bare shaft by the step of light at an end, without specular light and veils: black plastic reflects 2
-  /// to 5 %, a print's bright channels half. And the specular light there that counts.
-  double bare_shaft_light = 0.04, most_gloss = 0.6;
+  /// Diffuse light of the darkest channel on either side of an end, by the largest change of a channel there: black
+  /// plastic and a print's dark channels reflect 2 to 5 %, its bright ones half. And the specular light that counts.
+  double darkest_light = 0.04, most_gloss = 0.6;
 };
 inline constexpr FilmEdgeLimits film_edge_limits;
 
@@ -44,18 +46,31 @@ EvenLight even_light_of(std::span<const FadingPoint> points);
 /// For those of several boundaries, with what is usual.
 double usual_or_seen(std::span<const EvenLight> seen);
 
-/// The film's edge by its light, not counting specular light: 0 is the bare shaft, 1 the outside beside it.
-double film_edge_level(const Facing& facing, double even_light);
+/// The diffuse light on the film's edge by that on the outside beside it.
+double film_edge_light(const Facing& facing, double even_light);
 
-/// The values at a point of an end, along the end's own change of light: bare shaft, and the step up to the outside.
-struct EndPoint {
-  float shaft, step;
-};
+/// The light beside a point of an end, per channel: of the bare shaft and of the outside.
+using EndPoint = Eigen::Matrix<float, 3, 2>;
 inline constexpr std::size_t max_end_points = 64;
-/// Specular light on the bare shaft beside each point, by the step there: what the shaft, which is black, has more of
-/// than most of the end, as what all of it has veils the image. It is the outside's, too, but not that of the film's
-/// edge, which faces elsewhere and lies lower by as much.
-InplaceVector<double, max_end_points> gloss_of(std::span<const EndPoint> points);
+
+/// Levels of the film's edge at an end, by its light: 0 is the bare shaft, 1 the outside. In units of the step from the
+/// shaft up to the outside. What the darkest channel of either side has is specular light, which both sides have; what
+/// all of the end has of it veils the image. The film's edge faces elsewhere and has no specular light.
+class EndLight {
+ public:
+  explicit EndLight(std::span<const EndPoint> points);
+  /// In the channels of the step: without specular light, and what point i's specular light takes off.
+  double matt_level(double light) const { return light - (1 - light) * step_.dot(shaft_); }
+  double gloss_level(std::size_t point) const { return step_.sum() * gloss_[point]; }
+  /// In one channel, at point i; as in all where it does not show the end.
+  double level(double light, std::size_t point, std::size_t channel) const;
+
+ private:
+  Eigen::Vector3d step_, shaft_;                 // a unit vector, and the shaft's diffuse light by the step
+  InplaceVector<double, max_end_points> gloss_;  // specular light by the step there
+};
+/// Before it is seen: of a black shaft, without specular light.
+double usual_film_edge_level(const Facing& facing);
 
 /// By what fraction of the film's projected width an end is moved inwards whose film's edge has this level (of wide
 /// ones, in blurs, by less than that), and d(shift)/d(width).

@@ -39,21 +39,43 @@ TEST(EvenLight, IsTheUsualWhereNothingTells) {
   EXPECT_NEAR(usual_or_seen(std::array{even_light_of(fading(0.3, 0.3, 9))}), usual, 0.06);
 }
 
-// Rendered matt surfaces: a level that specular light does not touch; half of it in ambient light.
+// Matt surfaces; half of it in ambient light.
 TEST(FilmEdge, IsAsBrightAsItFacesTheLight) {
-  EXPECT_NEAR(film_edge_level({0.8, 0.8}, 0), 1, 1e-9);
-  EXPECT_NEAR(film_edge_level({0.8, 0.3}, 1), 1, 1e-9);
-  EXPECT_LT(film_edge_level({1, 0.01}, 0), 0);  // darker than the bare shaft
-  EXPECT_GT(film_edge_level({0.3, 0.8}, 0.1), 1.5);
+  EXPECT_NEAR(film_edge_light({0.8, 0.8}, 0), 1, 1e-9);
+  EXPECT_NEAR(film_edge_light({0.8, 0.3}, 1), 1, 1e-9);
+  EXPECT_NEAR(film_edge_light({1, 0.01}, 0), 0.01, 1e-9);
+  EXPECT_GT(film_edge_light({0.3, 0.8}, 0.1), 1.5);
 }
 
-TEST(Gloss, IsWhatTheShaftHasMoreOfThanMostOfTheEnd) {
-  std::vector<EndPoint> points;
-  for (int i = 0; i < 20; ++i) points.push_back({0.05F, 0.2F});  // a veil
-  points[10].shaft = 0.11F;
-  const auto gloss = gloss_of(points);
-  ASSERT_EQ(gloss.size(), points.size());
-  for (std::size_t i = 0; i < points.size(); ++i) EXPECT_NEAR(gloss.begin()[i], i == 10 ? 0.3 : 0, 1e-6);
+// A matt film's edge between a shaft of any grey and a blue outside, both with a highlight, behind a veil.
+TEST(EndLight, TellsTheLevelOfTheFilmsEdge) {
+  constexpr float veil = 0.05F, film_edge = 0.3F;
+  const Eigen::Vector3f blue(0.5F, 0.1F, 0.02F);
+  for (const float shaft : {0.02F, 0.15F, 0.4F, 0.8F}) {
+    SCOPED_TRACE(shaft);
+    std::vector<EndPoint> points;
+    std::vector<Eigen::Vector3f> edges;
+    for (int i = 0; i < 20; ++i) {
+      const float light = 0.5F + 0.02F * static_cast<float>(i), gloss = veil + (i % 5 == 4 ? 0.05F : 0);
+      points.emplace_back() << Eigen::Vector3f::Constant(shaft * light + gloss),
+          light * blue + Eigen::Vector3f::Constant(gloss);
+      edges.emplace_back(film_edge * light * blue + Eigen::Vector3f::Constant(veil));
+    }
+    const EndLight end(points);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const Eigen::Vector3f step = points[i].col(1) - points[i].col(0), up = edges[i] - points[i].col(0);
+      EXPECT_NEAR(end.matt_level(film_edge) - end.gloss_level(i), step.dot(up) / step.squaredNorm(), 0.03) << i;
+      EXPECT_NEAR(end.level(film_edge, i, 0) * static_cast<double>(step[0]), up[0], 0.01) << i;
+    }
+  }
+}
+
+// Where all of it is saturated a channel says nothing.
+TEST(EndLight, OfASaturatedChannelCountsForNothing) {
+  std::vector<EndPoint> points(20), others(20);
+  for (EndPoint& point : points) point << 0.3F, 0.5F, 0.3F, 0.1F, 0, 0;
+  for (EndPoint& point : others) point << 0.3F, 0.5F, 0.3F, 0.1F, 0.3F, 0.3F;
+  EXPECT_NEAR(EndLight(points).matt_level(0.3), EndLight(others).matt_level(0.3), 1e-6);
 }
 
 double blurred(double from_edge_px) {
