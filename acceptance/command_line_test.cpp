@@ -238,6 +238,11 @@ TEST_F(CommandLine, Markers) {
   expect_in(output(), "focal length of 825 px");
   expect_done("marker show --rig configs/example.yaml --focal-px 900");
   expect_in(output(), "focal length of 900 px");
+  EXPECT_EQ(errors().find("warning"), std::string::npos) << errors();
+  const std::string yellow = in("yellow.yaml", std::regex_replace(read_file("configs/example.yaml"),
+                                                                  std::regex("hues_deg: .90"), "hues_deg: [50"));
+  expect_done("marker show --rig " + yellow);
+  expect_in(errors(), "hues_deg[0] is 50");
   expect_refused("marker design --bands-upper-mm 5,5,10 --bands-lower-mm 10,5,5", {"not decodable"});
   expect_refused("marker design --diameter-mm 8 --length-mm 8", {"do not fit"});
   expect_refused("marker print --rig configs/example.yaml --out out/sheet.txt", {"sheet.txt"});

@@ -37,6 +37,7 @@ struct CheckedRig {
   RigFindings findings;
   std::vector<FrameEvidence> frames;
   std::vector<Advice> advice;
+  std::string tissue_hue;          // tissue_hue_text()
   std::string exact_registration;  // exact_registration_text()
   std::string tip;                 // how well it is known, or why not; empty without a tool
   // A frame of each kind with the pixels that have a band's hue painted (segmentation_picture); empty without such a
@@ -273,6 +274,7 @@ CheckLines check_lines(const CheckedRig& checked) {
                                   : "unknown: " + f.print->refusal});
   const auto more = f.arm ? arm_lines(*f.arm) : f.rcm ? rcm_lines(*f.rcm) : CheckLines{};
   lines.insert(lines.end(), more.begin(), more.end());
+  if (!checked.tissue_hue.empty()) lines.push_back({"warning", checked.tissue_hue});
   if (!checked.exact_registration.empty()) lines.push_back({"standard deviations", checked.exact_registration});
   if (!checked.tip.empty()) lines.push_back({"tip", checked.tip});
   if (f.work_space && f.work_space->places > 0)
@@ -384,7 +386,12 @@ int check(const CalibrateOptions& options) {
     checked.findings = findings_of(rig, index, evidence);
     checked.frames = evidence.frames();
     checked.findings.lossy = read.lossy;
-    if (checked.findings.found == 0) checked.findings.cause = diagnosis.cause();
+    if (std::string& cause = checked.findings.cause; checked.findings.found == 0) {
+      cause = diagnosis.cause();
+      if (cause.empty() && checked.findings.failure == Status::no_marker)
+        if (const std::string background = diagnosis.background(index); !background.empty())
+          cause = fmt::format(": {}{}", usual_cause(Status::no_marker), background);
+    }
     // Takes as long as the rest, which needs nothing of it.
     std::future<PrintCheck> print;
     if (checked.findings.light)
@@ -405,6 +412,7 @@ int check(const CalibrateOptions& options) {
   checked.advice = advice_on(checked.findings);
   if (instrument.tool)
     checked.tip = tip_text(instrument, checked.frames, find_wrist_input(options, rig, index, *job.frames, true));
+  checked.tissue_hue = tissue_hue_text(instrument.marker);
   checked.exact_registration = exact_registration_text(instrument);
   std::printf("%s\n", instrument.name.c_str());
   print(checked);

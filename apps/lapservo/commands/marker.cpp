@@ -10,6 +10,7 @@
 
 #include "apps/lapservo/cli/subcommands.h"
 #include "apps/lapservo/inputs/input_files.h"
+#include "lapservo/calibration/check/frame_diagnosis.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/core/atomic_file.h"
 #include "lapservo/core/csv.h"
@@ -88,6 +89,11 @@ void print_sigmas(const Marker& marker, const Viewing& viewing, double print_err
       "measures the print as it is.\n");
 }
 
+void warn_of_tissue_hue(const Marker& marker) {
+  if (const std::string text = tissue_hue_text(marker); !text.empty())
+    std::fprintf(stderr, "lapservo: warning: %s\n", text.c_str());
+}
+
 int run_design(const DesignOptions& options) {
   if (options.hues_deg.size() != 3) throw InputError("--hues", "needs three hues, like 90,180,270");
   const Viewing viewing = options.viewing.viewing(usual_focal_px);
@@ -106,6 +112,7 @@ int run_design(const DesignOptions& options) {
     if (options.min_band_mm) spec.min_band_m = 1e-3 * *options.min_band_mm;
     marker = design_marker(spec);
   }
+  warn_of_tissue_hue(marker);
   std::printf(
       "diameter %.2f mm, length %.2f mm, seen from %.0f mm with a focal length of %.0f px, %.2f px a boundary\n\n",
       1e3 * marker.diameter_m, 1e3 * marker.length_m(), 1e3 * viewing.distance_m, viewing.focal_px,
@@ -138,8 +145,12 @@ Instrument chosen(const RigOptions& options, const Rig& rig) {
   InputFiles inputs;
   inputs.add_rig(options.rig, rig);
   inputs.refuse_as_output(options.out);
-  if (options.instrument.empty()) return rig.instruments.front();
-  return rig.instruments[named_instrument(rig, options.instrument, options.rig, "--instrument")];
+  const Instrument& instrument =
+      options.instrument.empty()
+          ? rig.instruments.front()
+          : rig.instruments[named_instrument(rig, options.instrument, options.rig, "--instrument")];
+  warn_of_tissue_hue(instrument.marker);
+  return instrument;
 }
 
 // A sheet that is drawn by what was measured on a print repeats that print's errors, and the camera's hues as inks.

@@ -11,13 +11,16 @@
 #include <fmt/ranges.h>
 #include <opencv2/imgproc.hpp>
 
+#include "lapservo/calibration/check/rig_check.h"
 #include "lapservo/calibration/colour/marker_light.h"
 #include "lapservo/calibration/recording/frame_recording.h"
 #include "lapservo/calibration/registration/timed_pose.h"
+#include "lapservo/core/angles.h"
 #include "lapservo/core/statistics.h"
 #include "lapservo/marker/band_shares.h"
 #include "lapservo/marker/decoder.h"
 #include "lapservo/rig/registration_covariance.h"
+#include "lapservo/vision/colour/colour_classes.h"
 #include "lapservo/vision/tracker.h"
 
 namespace lapservo::internal {
@@ -83,6 +86,26 @@ std::string text_of(const Marker& marker, const std::vector<BandShares>& seen) {
       "rig, they are {}, {} and {} mm long where they face the camera, in the rig {}, {} and {} mm: write the print's "
       "bands_upper_m and bands_lower_m into the rig",
       1000 * marker.length_m(), seen_mm[0], seen_mm[1], seen_mm[2], rig_mm[0], rig_mm[1], rig_mm[2]);
+}
+
+// How many pixels have each of the rig's colours; those of none come first.
+std::vector<double> areas_px(const cv::Mat& bgr, const ColourClasses& classes) {
+  std::vector<double> areas(static_cast<std::size_t>(classes.count()) + 1);
+  for (int v = 0; v < bgr.rows; ++v)
+    for (int u = 0; u < bgr.cols; ++u) ++areas[classes(bgr.ptr(v) + 3 * static_cast<std::ptrdiff_t>(u))];
+  return areas;
+}
+
+// The most pixels that a band has beside the other two, of which one may be hidden; and, as vessels and drops have the
+// hues of bands, a whole marker's of the least width that is good enough. The widest marker in view is no bound: its
+// bands cover more than the tissue that joins a narrow one.
+double most_of_band_px(const Marker& marker, std::size_t band, double others_px) {
+  constexpr double one_hidden = 2;
+  double beside = 0;
+  for (const auto& bands_m : {marker.bands_upper_m, marker.bands_lower_m})
+    beside = std::max(beside, bands_m[band] / (bands_m[(band + 1) % 3] + bands_m[(band + 2) % 3]));
+  const double narrowest_px2 = rig_limits.width_px * rig_limits.width_px * marker.length_m() / marker.diameter_m;
+  return one_hidden * beside * others_px + narrowest_px2;
 }
 
 // A few frames, 8-bit BGR, of which most are to show an instrument when they are read in another way.
@@ -244,6 +267,20 @@ const char* usual_cause(Status status) {
   return "";
 }
 
+std::string tissue_hue_text(const Marker& marker) {
+  // Tissue, blood and fat are bluish red to yellow, by a few degrees more where the white balance is off.
+  constexpr double first_deg = -26, last_deg = 41;
+  constexpr double lowest_deg = last_deg + colour_limits.widest_reach_deg,
+                   highest_deg = whole_turn_deg + first_deg - colour_limits.widest_reach_deg;
+  for (std::size_t band = 0; band < 3; ++band)
+    if (const double hue_deg = marker.hues_deg[band]; hue_deg < lowest_deg || hue_deg > highest_deg)
+      return fmt::format(
+          "hues_deg[{}] is {:g}, near the hues of tissue, blood and fat: before these the marker may not be found; "
+          "print it with hues of {:g} to {:g} degrees",
+          band, hue_deg, lowest_deg, highest_deg);
+  return "";
+}
+
 void MissedRcm::add_missed(const Observation::MarkerPose& marker, const Eigen::Vector3d& rcm_m) {
   const TimedPose pose{0, marker};
   misses_m.push_back(pose.miss_m(rcm_m));
@@ -314,7 +351,29 @@ std::string FrameDiagnosis::text_of_refusals(bool lossy) const {
     return fmt::format(
         "{}: {} of {} frames are {}, and the recording is compressed: record without losses or at a higher bit rate",
         name, count, frames_, to_string(status));
-  return fmt::format("{}: {} of {} frames are {}: {}", name, count, frames_, to_string(status), usual_cause(status));
+  const auto instrument = std::ranges::find(rig_.instruments, name, &Instrument::name) - rig_.instruments.begin();
+  return fmt::format("{}: {} of {} frames are {}: {}{}", name, count, frames_, to_string(status), usual_cause(status),
+                     status == Status::no_marker ? background(static_cast<std::size_t>(instrument)) : "");
+}
+
+std::string FrameDiagnosis::background(std::size_t instrument) const {
+  const ColourClasses classes(rig_.instruments);
+  const Marker& marker = rig_.instruments[instrument].marker;
+  const auto& bands = classes.of_bands(instrument);
+  std::vector<std::vector<double>> all_px;
+  for (const cv::Mat& frame : kept_) all_px.push_back(areas_px(frame, classes));
+  for (std::size_t band = 0; band < bands.size(); ++band) {
+    const auto covers_more = [&](const std::vector<double>& px) {
+      const double others_px = px[bands[(band + 1) % 3]] + px[bands[(band + 2) % 3]];
+      return px[bands[band]] > most_of_band_px(marker, band, others_px);
+    };
+    if (2 * static_cast<std::size_t>(std::ranges::count_if(all_px, covers_more)) <= all_px.size()) continue;
+    return fmt::format(
+        "; or the background has the hue of a band: {:.0f} % of the image are near {:g} degrees, more than a marker "
+        "covers; print it with another hue, or change the background",
+        100 * all_px.back()[bands[band]] / static_cast<double>(kept_.back().total()), marker.hues_deg[band]);
+  }
+  return "";
 }
 
 std::string FrameDiagnosis::cause() const {

@@ -23,6 +23,10 @@ constexpr bool comes_by_compression(Status status) {
   return status == Status::poor_fit || status == Status::uncertain || status == Status::ambiguous;
 }
 
+/// One line, without a full stop, on the first hue of a marker whose class reaches those of tissue, which then joins
+/// the band: value, effect and hues to choose. Empty where there is none.
+std::string tissue_hue_text(const Marker& marker);
+
 /// Tolerance with which a print that is not calibrated yet is looked for: it is not to hide the marker.
 inline constexpr double uncalibrated_tolerance_m = 0.15e-3;
 
@@ -58,6 +62,10 @@ class FrameDiagnosis {
 
   /// To append to a refusal: "; " and the cause where frames without an instrument show one, else nothing.
   std::string cause() const;
+
+  /// To append to usual_cause(Status::no_marker): "; or " and the background with its remedy, where in most frames the
+  /// class of one of the instrument's bands covers more than a marker in view can; else nothing.
+  std::string background(std::size_t instrument) const;
 
  private:
   struct Seen {

@@ -1,6 +1,7 @@
 #include "lapservo/calibration/check/frame_diagnosis.h"
 
 #include <string>
+#include <tuple>
 #include <utility>
 
 #include <gtest/gtest.h>
@@ -109,6 +110,29 @@ TEST_F(FrameDiagnosisTest, NamesTheBandsWhereThePrintIsAnother) {
   marker.bands_upper_m = {0.1 * length_m, 0.3 * length_m, 0.6 * length_m};
   marker.bands_lower_m = {0.2 * length_m, 0.6 * length_m, 0.2 * length_m};
   expect_names(text(other, [](cv::Mat&) {}), "its bands do not fit");
+}
+
+TEST_F(FrameDiagnosisTest, NamesABackgroundOfABandsHue) {
+  const cv::Mat tissue(rig.camera.height_px, rig.camera.width_px, CV_8UC3, cv::Scalar(40, 90, 200));  // of hue 19
+  const cv::Mat with_marker = scenes::render(rig, {JointVector{0, 1.57, 0.09, 0}}, 7);
+  for (const auto& [bgr, hue_deg, named] :
+       {std::tuple(tissue, 20.0, true), {tissue, 90, false}, {with_marker, 90, false}}) {
+    Rig other = rig;
+    other.instruments[0].marker.hues_deg[0] = hue_deg;
+    FrameDiagnosis diagnosis(other);
+    diagnosis.add(bgr, {refused(Status::no_marker)});
+    EXPECT_EQ(diagnosis.background(0).find("100 % of the image are near 20 degrees") != std::string::npos, named);
+    EXPECT_EQ(diagnosis.background(0).empty(), !named);
+    if (named) expect_names(diagnosis.text(), usual_cause(Status::no_marker) + diagnosis.background(0));
+  }
+}
+
+TEST(TissueHue, IsNamed) {
+  for (const auto& [hue_deg, named] : {std::pair(0, true), {74, true}, {75, false}, {300, false}, {301, true}}) {
+    const std::string text = tissue_hue_text({.hues_deg = {180, static_cast<double>(hue_deg), 180}});
+    EXPECT_EQ(text.find("hues_deg[1] is " + std::to_string(hue_deg) + ","), named ? 0 : std::string::npos) << text;
+    EXPECT_EQ(text.find("75 to 300 degrees") != std::string::npos, named) << text;
+  }
 }
 
 TEST_F(FrameDiagnosisTest, NamesFramesOfTwoMoments) {
