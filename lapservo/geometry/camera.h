@@ -38,6 +38,9 @@ struct Camera {
   std::array<double, 5> distortion{};  ///< k1 k2 p1 p2 k3
   Response response;
   bool deinterlace = false;  ///< its frames are two fields, of two moments
+  /// From the exposure of the first row to that of the last, at a frame's time that of the middle; 0: a global shutter.
+  double readout_s = 0;
+  static constexpr double longest_readout_s = 0.1;
   ChromaticAberration chromatic_aberration = {};
   CameraSigmas sigmas = {};
   /// That of fx fy cx cy [px] k1 k2 p1 p2 k3. Without it `sigmas` count as independent, but for a third of the focal
@@ -53,6 +56,8 @@ struct Camera {
     return some != 0;
   }
   bool contains(const Eigen::Vector2d& raw_px, double margin_px = 0) const;
+  /// When a row is exposed, after the frame's time.
+  double exposed_after_s(double row_px) const { return readout_s * ((row_px + 0.5) / height_px - 0.5); }
 
   /// Pinhole image of a point in the camera frame; only for z > 0 (behind the camera it mirrors).
   Eigen::Vector2d ideal_from_point(const Eigen::Vector3d& point_in_camera) const {

@@ -212,7 +212,7 @@ CameraSigmas parse_camera_sigmas(const YamlField& camera) {
 Camera parse_camera_fields(const YamlField& field) {
   expect_keys(field, {{"image_width", "image_height", "header", "camera_name", "distortion_model", "camera_model",
                        "rectification_matrix", "projection_matrix", "binning_x", "binning_y", "roi", "deinterlace",
-                       "covariance"},
+                       "readout_s", "covariance"},
                       {"camera_matrix", "distortion_coefficients", "response", "lateral_chromatic_aberration"}});
   Camera camera;
   camera.width_px = parse_image_size(field["image_width"]);
@@ -242,6 +242,9 @@ Camera parse_camera_fields(const YamlField& field) {
   camera.chromatic_aberration = parse_chromatic_aberration(field["lateral_chromatic_aberration"]);
   if (const YamlField deinterlace = field["deinterlace"]; deinterlace.present())
     camera.deinterlace = deinterlace.boolean();
+  if (const YamlField readout = field["readout_s"]; readout.present())
+    camera.readout_s =
+        readout.number_between(-Camera::longest_readout_s, Camera::longest_readout_s, "-0.1 to 0.1 (seconds)");
   camera.sigmas = parse_camera_sigmas(field);
   if (const YamlField covariance = field["covariance"]; covariance.present())
     camera.covariance = parse_covariance(covariance, 9, "81 numbers, a covariance of fx fy cx cy [px] k1 k2 p1 p2 k3");

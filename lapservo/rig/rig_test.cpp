@@ -150,6 +150,7 @@ const Complaints wrong_types{
     {"camera: [1]\n", "camera: is a list of 1, expected a map with 'image_width'"},
     {with("1280", "1280px"), "camera.image_width: is 1280px, " + pixels},
     {with("  response", "  deinterlace: 1\n  response"), "camera.deinterlace: is 1, expected true or false"},
+    {with("  response", "  readout_s: 25\n  response"), "camera.readout_s: is 25, expected -0.1 to 0.1 (seconds)"},
     {with("[-0.1", "[nan"), "camera.distortion_coefficients.data[0]: is nan, " + finite},
     {with("0, 0, 1]}", "0, 0]}"),
      "camera.camera_matrix.data: is a list of 8, expected nine numbers, fx 0 cx 0 fy cy 0 0 1"},

@@ -247,6 +247,7 @@ std::string camera_yaml(const Camera& camera, int indent) {
     lines.add_measured("lateral_chromatic_aberration", camera.chromatic_aberration,
                        measured ? std::optional(ChromaticAberration{sigmas.blue, sigmas.red}) : std::nullopt);
   if (camera.deinterlace) lines.add("deinterlace", "true");
+  if (camera.readout_s != 0) lines.add("readout_s", text_of(camera.readout_s));
   return lines.text();
 }
 

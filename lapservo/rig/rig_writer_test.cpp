@@ -34,6 +34,7 @@ constexpr auto every_key = R"(camera:
   lateral_chromatic_aberration: {blue: 0.9993, red: 1.0007}
   sigma_lateral_chromatic_aberration: {blue: 1.0e-05, red: 2.0e-05}
   deinterlace: true
+  readout_s: -0.012
 instruments:
   - name: "a \"b\" \\ # : é"
     marker:

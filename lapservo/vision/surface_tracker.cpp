@@ -1,6 +1,7 @@
 #include "lapservo/vision/surface_tracker.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "lapservo/marker/azimuths.h"
 #include "lapservo/vision/colour/blob_search.h"
@@ -51,7 +52,25 @@ Scene SurfaceTracker::scene_of(const ImageView& image, const Tracked& it) const 
   scene.known_sides = it.print.known_sides();
   scene.max_p_false = options_.max_p_false;
   scene.registration = it.registration ? &*it.registration : nullptr;
+  if (rig_.camera.readout_s != 0) scene.before = pose_before(it);
   return scene;
+}
+
+// Also what was refused: a marker that moves looks like another one before its motion is known.
+std::optional<PoseBefore> SurfaceTracker::pose_before(const Tracked& it) const {
+  if (it.memory) return it.memory->pose_before(now_s_);
+  const std::optional<ShaftPose>& seen = it.seen_before[0];
+  if (!seen) return std::nullopt;
+  return PoseBefore{{*seen, false}, before_s_ - now_s_ + exposed_after_s(rig_.camera, it.instrument.marker, *seen)};
+}
+
+// When the middle of its marker is exposed in this frame.
+double SurfaceTracker::seen_s(const Tracked& it, const PoseUnknowns& pose) const {
+  return now_s_ + exposed_after_s(rig_.camera, it.instrument.marker, pose.pose());
+}
+
+PoseUnknowns SurfaceTracker::expected_pose(const Tracked& it) const {
+  return it.memory->expected_pose(seen_s(it, it.memory->fit.unknowns));
 }
 
 // Takes in the frame; says whether it, or one shortly before it, shows two moments of an instrument.
@@ -61,7 +80,7 @@ bool SurfaceTracker::remember(const ImageView& image) {
     const auto before = it.seen_before;
     it.seen_before = {fit ? fit->unknowns.pose() : it.found.refused, before[0]};
     if (!fit) continue;
-    it.memory = remembered(it.memory, *fit, !it.beside.empty(), now_s_);
+    it.memory = remembered(it.memory, *fit, !it.beside.empty(), seen_s(it, fit->unknowns));
     if (shows_two_moments(scene_of(image, it), *fit, before)) blended_s_ = now_s_;
   }
   return blended_s_ && now_s_ - *blended_s_ < two_moments_limits.told_for_s;
@@ -87,7 +106,7 @@ void SurfaceTracker::cover(Tracked& other, const ShaftPose& pose, WorkBudget& bu
 // Those that may hide or touch it, found or expected; or only those that were found before it. Whether there are any.
 bool SurfaceTracker::cover_expected(const Tracked& known, WorkBudget& budget, bool only_before) {
   const auto pose_of = [&](const Tracked& it) {
-    return it.found.fit ? it.found.fit->unknowns.pose() : it.memory->expected_pose(now_s_).pose();
+    return it.found.fit ? it.found.fit->unknowns.pose() : expected_pose(it).pose();
   };
   const ShaftPose pose = pose_of(known);
   others_.clear();
@@ -135,7 +154,7 @@ Found SurfaceTracker::follow_known(const ImageView& image, const LightImage& lig
   const InstrumentMemory& memory = *known.memory;
   const auto follow_it = [&] {
     known.beside = others_;
-    return follow(scene_of(image, known), light, memory.expected_pose(now_s_), memory.expected(now_s_), budget);
+    return follow(scene_of(image, known), light, expected_pose(known), memory.expected(now_s_), budget);
   };
   others_.clear();
   if (memory.among_others) cover_expected(known, budget);
@@ -208,20 +227,25 @@ Observation SurfaceTracker::observed(const ImageView& image, const Tracked& it, 
   const ShaftPose& pose = found.fit->unknowns.pose();
   if (!it.instrument.marker.bands_are_measured() && it.print.is_off())
     return refused_observation(Status::marker_mismatch, pose);
-  return is_blended ? refused_observation(Status::blended, pose) : observation_of(scene_of(image, it), *found.fit);
+  if (is_blended) return refused_observation(Status::blended, pose);
+  if (rig_.camera.readout_s == 0 || options_.single) return observation_of(scene_of(image, it), *found.fit);
+  // How it moves while rows are read is not known before.
+  if (!found.fit->motion.to_frame_sigma()) return refused_observation(Status::uncertain, pose);
+  return observation_of(scene_of(image, it), found.fit->at_frame());
 }
 
 const std::vector<Observation>& SurfaceTracker::track(const cv::Mat& image_bgr, std::optional<double> time_s) {
   const ImageView image(image_bgr);
   const LightImage light(image, light_, channels_);
   if (options_.single) forget();
-  now_s_ = clock_.next(time_s);
+  before_s_ = std::exchange(now_s_, clock_.next(time_s));
   for (Tracked& it : tracked_) it.print.begin_frame(now_s_), it.print_before = it.print;
   WorkBudget budget(options_.single ? std::nullopt : options_.frame_budget);
   find(image, light, budget);
   const bool is_blended = remember(image);
   for (std::size_t i = 0; i < tracked_.size(); ++i) {
-    if (!is_blended) learn_print(tracked_[i]);
+    const bool may_roll = rig_.camera.readout_s != 0 && !tracked_[i].seen_before[1];
+    if (!is_blended && !may_roll) learn_print(tracked_[i]);
     observations_[i] = observed(image, tracked_[i], is_blended);
   }
   return observations_;

@@ -69,6 +69,9 @@ class SurfaceTracker {
   static void learn_print(Tracked& it);
   Observation observed(const ImageView& image, const Tracked& it, bool is_blended) const;
   Scene scene_of(const ImageView& image, const Tracked& it) const;
+  std::optional<PoseBefore> pose_before(const Tracked& it) const;
+  double seen_s(const Tracked& it, const PoseUnknowns& pose) const;
+  PoseUnknowns expected_pose(const Tracked& it) const;
 
   Rig rig_;
   TrackerOptions options_;
@@ -76,7 +79,7 @@ class SurfaceTracker {
   LightTable light_;
   ChannelGeometry channels_;
   FrameClock clock_;
-  double now_s_ = 0;  // of this frame
+  double now_s_ = 0, before_s_ = 0;  // of this frame and the one before
   std::vector<Tracked> tracked_;
   std::optional<double> blended_s_;        // when a frame last showed two moments
   bool next_frame_ = false;                // one was followed twice or in vain

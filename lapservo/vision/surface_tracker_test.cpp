@@ -95,6 +95,47 @@ std::vector<JointVector> slow_motion(const Rig& rig, std::uint64_t seed, int fra
   return motion;
 }
 
+// A hand's motion: not even.
+JointVector moving_from(const JointVector& start, double time_s) {
+  JointVector q = start;
+  const double wave = std::sin(3 * time_s);
+  q.theta_rad += 0.07 * wave, q.phi_rad -= 0.05 * wave, q.rho_m += 0.02 * time_s, q.psi_rad += 0.8 * time_s;
+  return q;
+}
+
+// As a rolling shutter shows the motion at a frame's time: strips of the image, exposed one after another.
+cv::Mat rolled(const Rig& rig, const JointVector& start, double frame_s, std::uint64_t seed) {
+  constexpr int strip_rows = 8, reach_px = 130;
+  cv::Mat image = scenes::render(rig, {moving_from(start, frame_s)}, seed);
+  const int middle = static_cast<int>(middle_px(rig, 0, moving_from(start, frame_s)).y());
+  for (int row = std::max(0, middle - reach_px); row < std::min(image.rows, middle + reach_px); row += strip_rows) {
+    const cv::Range rows(row, std::min(row + strip_rows, image.rows));
+    const double at_s = frame_s + rig.camera.exposed_after_s((rows.start + rows.end - 1) / 2.0);
+    scenes::render(rig, {moving_from(start, at_s)}, seed).rowRange(rows).copyTo(image.rowRange(rows));
+  }
+  return image;
+}
+
+TEST(SurfaceTracker, SeesMotionThroughARollingShutter) {
+  double squares = 0;
+  int told = 0;
+  for (const double readout_s : {0.025, -0.02}) {
+    Rig rig = scenes::usual_rig();
+    rig.camera.readout_s = readout_s;
+    Random random(readout_s > 0 ? 5 : 6);
+    const JointVector start = scenes::random_configuration(rig, 0, random);
+    SurfaceTracker tracker(rig, {.frame_budget = {}});
+    for (int i = 0; i < 8; ++i) {
+      const double frame_s = i / 30.0;
+      const Observation seen = tracker.track(rolled(rig, start, frame_s, 10 * i), frame_s)[0];
+      EXPECT_TRUE(i >= 3 || seen.status != Status::ok) << "its motion is not known";
+      if (seen.status == Status::ok) squares += normalised_square(seen, moving_from(start, frame_s)), ++told;
+    }
+  }
+  EXPECT_GE(told, 8);
+  EXPECT_LT(squares / told, 4);
+}
+
 // A defocused image can't show that the camera sharpens, and the next one may start from its blur: they are less sure
 // then, and those that follow are corrected again.
 TEST(SurfaceTracker, RemembersThatTheCameraSharpens) {

@@ -40,6 +40,7 @@ class Camera:
         response: Union[str, float, tuple[Sequence[float], Sequence[float]]] = ...,
         chromatic_aberration: tuple[float, float] = ...,
         deinterlace: bool = ...,
+        readout_s: float = ...,
         sigma_response: Optional[float] = ...,
     ) -> None: ...
     width_px: int
@@ -49,6 +50,7 @@ class Camera:
     response: Union[str, float, tuple[tuple[float, ...], tuple[float, ...]]]
     chromatic_aberration: tuple[float, float]
     deinterlace: bool
+    readout_s: float
     sigma_response: Optional[float]
     def ideal_from_raw(self, raw_px: ArrayLike) -> Optional[_Array]: ...
     def raw_from_ideal(self, ideal_px: ArrayLike) -> _Array: ...

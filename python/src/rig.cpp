@@ -66,7 +66,7 @@ std::array<double, 5> distortion_of(const Eigen::VectorXd& given) {
 
 Camera make_camera(int width_px, int height_px, const Array<"matrix", 3, 3>& given_matrix,
                    const Array<"distortion", Eigen::Dynamic>& distortion, const py::object& response,
-                   const std::pair<double, double>& chromatic_aberration, bool deinterlace,
+                   const std::pair<double, double>& chromatic_aberration, bool deinterlace, double readout_s,
                    std::optional<double> sigma_response) {
   Camera camera;
   if (sigma_response && *sigma_response < 0)
@@ -83,6 +83,9 @@ Camera make_camera(int width_px, int height_px, const Array<"matrix", 3, 3>& giv
   camera.response.sigma = sigma_response;
   camera.chromatic_aberration = {chromatic_aberration.first, chromatic_aberration.second};
   camera.deinterlace = deinterlace;
+  if (!(std::abs(readout_s) <= Camera::longest_readout_s))
+    throw InputError("Camera", "readout_s", fmt::format("{}", readout_s), "-0.1 to 0.1 (seconds)");
+  camera.readout_s = readout_s;
   return camera;
 }
 
@@ -102,10 +105,12 @@ matrix.)");
   type.def(py::init(&make_camera), py::arg("width_px"), py::arg("height_px"), py::arg("matrix"), py::kw_only(),
            py::arg("distortion") = std::array<double, 5>{}, py::arg("response") = py::str("srgb"),
            py::arg("chromatic_aberration") = std::pair(1.0, 1.0), py::arg("deinterlace") = false,
-           py::arg("sigma_response") = py::none(),
+           py::arg("readout_s") = 0.0, py::arg("sigma_response") = py::none(),
            "matrix: float[3, 3] in px; distortion: k1 k2 p1 p2 k3 as OpenCV has them (k3 or all may be left out, zeros "
            "may follow); response: 'srgb', 'rec709', 'linear', a power, or (light, value); chromatic_aberration: "
-           "magnification of blue and of red beside green's; sigma_response: of a response that was measured.")
+           "magnification of blue and of red beside green's; readout_s: of a rolling shutter, from the first row's "
+           "exposure "
+           "to the last one's; sigma_response: of a response that was measured.")
       .def_readonly("width_px", &Camera::width_px)
       .def_readonly("height_px", &Camera::height_px)
       .def_property_readonly("matrix", read_only<Camera>(&matrix_of_camera), "float[3, 3], px")
@@ -116,6 +121,7 @@ matrix.)");
                                return std::pair(camera.chromatic_aberration.blue, camera.chromatic_aberration.red);
                              })
       .def_readonly("deinterlace", &Camera::deinterlace)
+      .def_readonly("readout_s", &Camera::readout_s)
       .def_property_readonly(
           "sigma_response", [](const Camera& camera) { return camera.response.sigma; },
           "one standard deviation of the response that was measured, of the full value; None where it was not")

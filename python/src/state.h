@@ -26,7 +26,7 @@ struct Members {
   }
   static auto of(Camera& v) {
     return std::tie(v.width_px, v.height_px, v.fx_px, v.fy_px, v.cx_px, v.cy_px, v.distortion, v.response,
-                    v.deinterlace, v.chromatic_aberration, v.sigmas, v.covariance);
+                    v.deinterlace, v.readout_s, v.chromatic_aberration, v.sigmas, v.covariance);
   }
   static auto of(MarkerSigmas& v) {
     return std::tie(v.diameter_m, v.hues_deg, v.bands_upper_m, v.bands_lower_m, v.seam_rad, v.wrap_m, v.skew_m,

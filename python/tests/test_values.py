@@ -28,7 +28,7 @@ def values(rig, image, tmp_path_factory):
             lapservo.Tracker(rig).track(np.full_like(image, 90))[0]]
     measured = re.sub("^( +)(diameter_m:)", r"\1sigma_diameter_m: 0.00001\n\1\2", rig.to_yaml(), flags=re.MULTILINE)
     camera = lapservo.Camera(64, 48, np.diag([50, 60, 1.0]), distortion=[0.1, 0, 0, 0], response=([0, 0.2, 1], [0, 0.5, 1]),
-                             chromatic_aberration=(1.001, 0.999), deinterlace=True, sigma_response=0.01)
+                             chromatic_aberration=(1.001, 0.999), deinterlace=True, readout_s=0.01, sigma_response=0.01)
     return [rig, lapservo.Rig.load(SOURCE / "configs" / "paper.yaml"), lapservo.Rig.parse(measured), rig.camera, camera,
             instrument, lapservo.Instrument("x", instrument.marker), instrument.marker, instrument.joints,
             lapservo.Joints(list("abcd"), sign=[1, -1, 1, 1]), frame, seen[0].marker_pose, *seen]

@@ -34,6 +34,7 @@ struct Frame {
   // Axes of the unrolled frame, in the camera; and the camera in that frame [m].
   Eigen::Matrix3d axes = unknowns.pose().camera_from_unrolled.rotation.toRotationMatrix();
   Eigen::Vector3d camera_in_unrolled = -axes.transpose() * unknowns.pose().camera_from_unrolled.translation;
+  RowMotion motion = scene.motion_at(unknowns);
 
   const Marker& marker() const { return scene.marker; }
   Generatrix generatrix(double azimuth_rad) const {
@@ -154,7 +155,6 @@ std::optional<BoundaryPlace> place_boundary(const Frame& frame, const Neighbourh
   const ProjectionWithJacobian image = frame.scene.camera.raw_with_jacobian(point);
   const Eigen::Vector2d axis_px = image.d_px_d_point * frame.axes.col(2);
   const double px_per_m = axis_px.norm();
-  place.point_px = image.point_px;
   place.along = axis_px / px_per_m;
   const Eigen::Vector2d tangent =
       (frame.marker().radius_m() * (image.d_px_d_point * generatrix.around) + slope_m * axis_px).normalized();
@@ -173,18 +173,19 @@ std::optional<BoundaryPlace> place_boundary(const Frame& frame, const Neighbourh
   const int reach = static_cast<int>(std::min({edge_limits.blur_reach * line_blur_px + effort.extra_px,
                                                own_px - line_blur_px, double{EdgeProfile::max_reach}}));
   if (reach < 3) return std::nullopt;
-  const auto line = frame.edge_line(generatrix, along_m[k], image.point_px, place.along, reach, reach, line_blur_px);
-  if (!line) return std::nullopt;
-  place.line = *line;
   const Eigen::Vector3d pull = image.d_px_d_point.transpose() * normal;
   place.film_px_per_m = -pull.dot(generatrix.outwards);
   place.measurement.along_px_per_m = pull.dot(frame.axes.col(2));
   place.measurement.row = frame.unknowns.row(point, pull);
   place.measurement.row[psi_unknown] = -slope_m * place.measurement.along_px_per_m;
+  place.point_px = image.point_px + frame.motion.shift_px(place.measurement.row, image.point_px, normal) * normal;
+  const auto line = frame.edge_line(generatrix, along_m[k], place.point_px, place.along, reach, reach, line_blur_px);
+  if (!line) return std::nullopt;
+  place.line = *line;
   place.measurement.row[film_unknown] = place.film_shift * film_sigma_m * place.film_px_per_m;
   place.measurement.group = k;
   place.measurement.turn_fraction = wrap_two_pi(frame.tau(generatrix.azimuth_rad)) / frame.marker().covered_rad();
-  place.measurement.expected_px = image.point_px.cast<float>();
+  place.measurement.expected_px = place.point_px.cast<float>();
   place.measurement.normal = normal.cast<float>();
   place.measurement.clear_px = static_cast<float>(own_px * cosine - blur_px);
   return place;
@@ -383,13 +384,15 @@ std::optional<SidePlace> place_side(const Frame& frame, const Side& side, double
   if (inside < 3) return std::nullopt;
   const double room_m = reach_px * frame.marker().length_m() / 200;
   if (!one_band(frame, side.contour.azimuth_rad, side.deep.azimuth_rad, along_m, room_m)) return std::nullopt;
-  auto line = frame.edge_line(side.contour, along_m, image.point_px, inwards, outside, inside, blur_px);
-  if (!line) return std::nullopt;
-  line->contour_radius_px = static_cast<float>(radius_px);
   Measurement measurement{};
   measurement.row = frame.unknowns.row(point, image.d_px_d_point.transpose() * inwards);
+  const Eigen::Vector2d shown_px =
+      image.point_px + frame.motion.shift_px(measurement.row, image.point_px, inwards) * inwards;
+  auto line = frame.edge_line(side.contour, along_m, shown_px, inwards, outside, inside, blur_px);
+  if (!line) return std::nullopt;
+  line->contour_radius_px = static_cast<float>(radius_px);
   measurement.group = side.group;
-  measurement.expected_px = image.point_px.cast<float>();
+  measurement.expected_px = shown_px.cast<float>();
   measurement.normal = inwards.cast<float>();
   return SidePlace{measurement, *line};
 }

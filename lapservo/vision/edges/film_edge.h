@@ -54,8 +54,8 @@ using EndPoint = Eigen::Matrix<float, 3, 2>;
 inline constexpr std::size_t max_end_points = 64;
 
 /// Levels of the film's edge at an end, by its light: 0 is the bare shaft, 1 the outside. In units of the step from the
-/// shaft up to the outside. What the darkest channel of either side has is specular light, which both sides have; what
-/// all of the end has of it veils the image. The film's edge faces elsewhere and has no specular light.
+/// shaft up to the outside. Both sides have specular light, that of the darkest channel of either side; its part that
+/// all of the end has veils the image. The film's edge faces elsewhere and has no specular light.
 class EndLight {
  public:
   explicit EndLight(std::span<const EndPoint> points);

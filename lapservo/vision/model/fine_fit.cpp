@@ -277,6 +277,13 @@ double FineFit::located_fraction() const {
   return static_cast<double>(located) / std::max(1, in_image[0] + in_image[1] + in_image[2] + in_image[3]);
 }
 
+FineFit FineFit::at_frame() const {
+  FineFit fit = *this;
+  fit.unknowns = unknowns.changed_by(motion.to_frame());
+  if (const auto& sigma = motion.to_frame_sigma()) fit.covariance.diagonal() += sigma->cwiseAbs2();
+  return fit;
+}
+
 FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknowns& start, const Expected& expected) {
   FineFit fit;
   fit.unknowns = start;
@@ -286,6 +293,7 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
   if (!fitter.settle() || !fitter.see_camera(expected)) return fit;
   fitter.judge(expected);
   if (fitter.settles_by_rcm() && fitter.see_camera(expected)) fitter.judge(expected);
+  fit.motion = scene.motion_at(fit.unknowns);
   return fit;
 }
 

@@ -33,6 +33,7 @@ struct FineFit : PrintVerdict, PlacesLookedAt {
   bool converged = false;
   PoseUnknowns unknowns;
   PoseUnknowns as_the_rig_says;  ///< the pose, were the print exactly so
+  RowMotion motion;              ///< of which the unknowns hold for the exposure of the marker's middle
   /// Covariance of the unknowns with the registration's numbers (RcmPrior).
   Eigen::Matrix<double, pose_unknowns, 6> with_registration = Eigen::Matrix<double, pose_unknowns, 6>::Zero();
   EdgeBlur blur;
@@ -53,6 +54,8 @@ struct FineFit : PrintVerdict, PlacesLookedAt {
   /// fits to a frame the better one has less.
   double misfit() const;
   double psi_variance_rad2() const { return covariance(psi_unknown, psi_unknown); }
+  /// The same at the frame's time.
+  FineFit at_frame() const;
   /// Whether enough of the boundary points are located to blame the print or the registration.
   bool is_well_seen() const { return located_fraction() > fine_fit_limits.well_seen_fraction; }
 };

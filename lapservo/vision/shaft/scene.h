@@ -5,6 +5,7 @@
 #include <bitset>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include "lapservo/core/angles.h"
@@ -15,6 +16,7 @@
 #include "lapservo/vision/image/light_image.h"
 #include "lapservo/vision/observation.h"
 #include "lapservo/vision/shaft/rcm_prior.h"
+#include "lapservo/vision/shaft/rolling_shutter.h"
 #include "lapservo/vision/shaft/shaft_cover.h"
 
 namespace lapservo::internal {
@@ -40,6 +42,7 @@ struct Scene {
   PrintSides known_sides{};                     ///< from which earlier frames showed that its print is the rig's
   double max_p_false = Observation::usual_max_p_false;  ///< TrackerOptions::max_p_false
   const RcmPrior* registration = nullptr;               ///< of the instrument; nullptr where it is not known
+  std::optional<PoseBefore> before{};                   ///< of a rolling shutter: the marker in the frame before
   LensField field{camera};
 
   /// Where the image says nothing of this instrument: beyond its border, or since another one shows there.
@@ -65,6 +68,10 @@ struct Scene {
   }
   /// Whether the registration shows on which lines of the image the shaft may lie.
   bool knows_rcm() const { return registration && registration->is_within(marker.radius_m()); }
+  /// How its rolling shutter, if it has one, shows the marker at a pose.
+  RowMotion motion_at(const PoseUnknowns& pose) const {
+    return before ? RowMotion(camera, marker, pose, *before) : RowMotion();
+  }
   /// Whether it is the class of one of the marker's bands.
   bool is_ours(std::uint8_t colour) const { return colour == bands[0] || colour == bands[1] || colour == bands[2]; }
 };
