@@ -23,11 +23,7 @@
 #include "lapservo/calibration/registration/registration.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/core/random.h"
-#include "lapservo/geometry/rotation.h"
-#include "lapservo/sim/boards.h"
 #include "lapservo/sim/instrument_shaft.h"
-#include "lapservo/sim/renderer.h"
-#include "lapservo/sim/tissue.h"
 #include "lapservo/testing/environment.h"
 
 namespace lapservo::acceptance {

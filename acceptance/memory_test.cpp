@@ -1,6 +1,5 @@
 // Tracking for hours needs no more memory than tracking for minutes: cold, followed, lost and refused frames by turns.
 #include <fstream>
-#include <string>
 #include <unistd.h>
 #include <vector>
 

@@ -1,7 +1,5 @@
 // docs/paper.md names files, functions and tests, docs/notes/arm.md tests: all of them exist.
 
-#include <algorithm>
-#include <cctype>
 #include <filesystem>
 #include <fstream>
 #include <regex>

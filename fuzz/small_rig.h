@@ -1,11 +1,8 @@
 #pragma once
 
-#include "lapservo/core/angles.h"
-#include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/rig/rig.h"
 
 namespace lapservo::fuzz {
-using namespace internal;
 
 /// Two instruments before a camera of 160x120: small enough for thousands of frames a minute. The RCM lies 100 mm left
 /// of the camera's axis, at the depth of the work space; q = [0, pi/2, rho, psi] points to the right across the image.

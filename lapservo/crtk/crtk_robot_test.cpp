@@ -7,7 +7,6 @@
 
 #include <gtest/gtest.h>
 
-#include "lapservo/crtk/joint_map.h"
 #include "lapservo/crtk/operator_presence.h"
 #include "lapservo/crtk/test_transport.h"
 #include "lapservo/testing/process.h"

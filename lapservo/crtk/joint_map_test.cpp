@@ -4,8 +4,7 @@
 
 #include <gtest/gtest.h>
 
-namespace lapservo::internal {
-namespace joint_map_test {
+namespace lapservo::internal::joint_map_test {
 
 constexpr double half_pi = std::numbers::pi / 2;
 
@@ -54,5 +53,4 @@ TEST(JointMap, KnowsADvrksNamesOfBothTimes) {
             "has the joints yaw, pitch, insertion, roll, wrist_pitch, wrist_yaw, expected q1, q2, q3, q4");
 }
 
-}  // namespace joint_map_test
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::joint_map_test

@@ -7,8 +7,7 @@
 
 #include "lapservo/core/random.h"
 
-namespace lapservo::internal {
-namespace stamp_clock_test {
+namespace lapservo::internal::stamp_clock_test {
 
 constexpr double epoch_s = 1.7e9, period_s = 0.01;
 
@@ -109,5 +108,4 @@ TEST(StampClock, AWayThatVariesStaysLate) {
   }
 }
 
-}  // namespace stamp_clock_test
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::stamp_clock_test

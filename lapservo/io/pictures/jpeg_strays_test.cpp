@@ -16,8 +16,7 @@
 #include "lapservo/io/pictures/jpeg_picture.h"
 #include "lapservo/testing/temporary_folder.h"
 
-namespace lapservo::internal {
-namespace jpeg_strays_test {
+namespace lapservo::internal::jpeg_strays_test {
 using Bytes = std::vector<std::uint8_t>;
 
 constexpr std::uint64_t seed = 20261127;
@@ -142,5 +141,4 @@ TEST(JpegStrays, BlocksThatAreLeftOverAreNone) {
   EXPECT_LE(taken, 8) << "of " << left_over << ", seed " << seed;
 }
 
-}  // namespace jpeg_strays_test
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::jpeg_strays_test

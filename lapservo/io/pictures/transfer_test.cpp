@@ -20,8 +20,7 @@
 #include "lapservo/testing/temporary_folder.h"
 #include "lapservo/testing/videos.h"
 
-namespace lapservo::internal {
-namespace transfer_test {
+namespace lapservo::internal::transfer_test {
 using testing::expect_patches;
 
 using Encoding = std::function<double(double)>;
@@ -194,5 +193,4 @@ TEST(Transfer, OfAPngThatSaysWhatCamerasDoIsTheRigs) {
     expect_patches(decode_image(bytes, "p"), patches, 0);
 }
 
-}  // namespace transfer_test
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::transfer_test
