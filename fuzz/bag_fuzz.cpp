@@ -2,7 +2,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <string_view>
 
 #include <opencv2/core/utils/logger.hpp>
 
@@ -24,7 +23,8 @@ void read_messages(const Bag& bag) {
   for (const BagTopic& topic : bag.topics()) {
     require(std::isfinite(topic.duration_s), "a topic's duration is finite");
     read_or_refuse([&] {
-      for (const auto messages = bag.messages(topic); messages->next();) continue;
+      for (const auto messages = bag.messages(topic); messages->next();)
+        require(std::isfinite(messages->recorded_s()), "a time is finite");
     });
   }
 }
