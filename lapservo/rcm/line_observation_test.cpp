@@ -4,21 +4,8 @@
 
 #include <gtest/gtest.h>
 
-#include "lapservo/rcm/test_lines.h"
-
 namespace lapservo::internal {
 namespace {
-
-TEST(LineObservation, LinesThroughAPointMeetThere) {
-  testing::SeededRandom random(61);
-  for (int trial = 0; trial < 200; ++trial) {
-    const Eigen::Vector2d point(random.uniform(-2000, 2000), random.uniform(-2000, 2000));
-    const auto lines = testing::fan_of_lines(point, 2, 1, random);
-    const auto met = intersection_px(lines[0], lines[1]);
-    ASSERT_TRUE(met);
-    EXPECT_LT((*met - point).norm(), 1e-4);
-  }
-}
 
 TEST(LineObservation, ToldApartFromWhatIsNone) {
   EXPECT_TRUE(is_usable(line_between({0, 0}, {100, 50}, 1)));
