@@ -16,8 +16,7 @@
 #include "lapservo/core/random.h"
 #include "lapservo/crtk/joint_map.h"
 
-namespace lapservo::internal {
-namespace interlock_test {
+namespace lapservo::internal::interlock_test {
 
 constexpr double epoch_s = 1.7e9, tick_s = 0.002, joints_period_s = 0.004;
 const double max_s = InterlockConfig().max_age_s;
@@ -562,28 +561,21 @@ TEST(Interlock, ObservesOnlyUntilMotionIsEnabled) {
   EXPECT_TRUE(led.interlock.state(led.now_s).follows);
 }
 
-TEST(Interlock, BrakesWhenTheLoopIsGone) {
-  Bench bench;
-  bench.control(0.5, slow);
-  bench.pass(0.5);
-  const int sent = bench.sent_count;
-  EXPECT_EQ(bench.interlock.velocities(), std::vector<double>(5, 0.0));
-  bench.pass(0.5);
-  EXPECT_EQ(bench.sent_count, sent);
-}
-
-TEST(Interlock, ReleasedItBrakesToRestAndIsSilent) {
-  Bench bench;
-  bench.control(0.5, slow);
-  const Eigen::Vector4d shift = bench.setpoint - bench.path.at(bench.now_s - tick_s).position;
-  bench.interlock.release();
-  bench.pass(0.5);
-  const int sent = bench.sent_count;
-  EXPECT_LT((bench.setpoint - shift - bench.path.at(bench.now_s).position).norm(), 1e-5);
-  bench.pass(0.5);
-  EXPECT_EQ(bench.sent_count, sent);
-  bench.control(0.5, slow);
-  EXPECT_GT(bench.sent_count, sent + 200);
+TEST(Interlock, ReleasedOrWithoutTheLoopItBrakesToRestAndIsSilent) {
+  for (const bool released : {true, false}) {
+    Bench bench;
+    bench.control(0.5, slow);
+    const Eigen::Vector4d shift = bench.setpoint - bench.path.at(bench.now_s - tick_s).position;
+    if (released) bench.interlock.release();
+    bench.pass(0.5);
+    const int sent = bench.sent_count;
+    EXPECT_EQ(bench.interlock.velocities(), std::vector<double>(5, 0.0));
+    EXPECT_LT((bench.setpoint - shift - bench.path.at(bench.now_s).position).norm(), 1e-5);
+    bench.pass(0.5);
+    EXPECT_EQ(bench.sent_count, sent);
+    bench.control(0.5, slow);
+    EXPECT_GT(bench.sent_count, sent + 200);
+  }
 }
 
 // One topic after the other: not one of a second arm's messages is used, and none is sent while there is one.
@@ -680,5 +672,4 @@ TEST(Interlock, CountsWhatItDrops) {
   EXPECT_GE(bench.interlock.counts().joint_states, 24);
 }
 
-}  // namespace interlock_test
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::interlock_test
