@@ -15,8 +15,7 @@
 #include "recordings/ros2_bag_writer.h"
 #include "transports/ros2/cdr.h"
 
-namespace lapservo::internal {
-namespace bag_recorder_test {
+namespace lapservo::internal::bag_recorder_test {
 using eprosima::fastcdr::Cdr;
 using lapservo::testing::input_error;
 
@@ -117,5 +116,4 @@ TEST(BagRecorder, RecordsFromSeveralThreads) {
   for (int i = 0; i < count; ++i) EXPECT_EQ(std::get<ImageMessage>(images[i]).stamp_s, begin_s + i);
 }
 
-}  // namespace bag_recorder_test
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::bag_recorder_test

@@ -15,8 +15,7 @@
 #include "recordings/test_bags.h"
 #include "transports/ros2/cdr.h"
 
-namespace lapservo::internal {
-namespace open_bag_test {
+namespace lapservo::internal::open_bag_test {
 using testing::BagEntry;
 using testing::input_error;
 
@@ -202,5 +201,4 @@ TEST(CdrDecoder, ReadsBothByteOrdersAndNothingThatIsCutShort) {
   }
 }
 
-}  // namespace open_bag_test
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::open_bag_test

@@ -17,8 +17,7 @@
 #include "recordings/open_bag.h"
 #include "recordings/test_bags.h"
 
-namespace lapservo::internal {
-namespace session_test {
+namespace lapservo::internal::session_test {
 using testing::input_error;
 
 constexpr std::int64_t begin_ns = 1700000000000000000;
@@ -159,5 +158,4 @@ TEST(Session, ThatIsDamagedIsReadOrRefused) {
   EXPECT_NE(none.find("has 0 video streams of the name room"), std::string::npos) << none;
 }
 
-}  // namespace session_test
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::session_test

@@ -22,8 +22,7 @@
 #include "transports/ros1/ros1_node.h"
 #include "transports/ros1/test_ros_master.h"
 
-namespace lapservo::internal {
-namespace ros1_transport_test {
+namespace lapservo::internal::ros1_transport_test {
 using testing::wait_for;
 
 constexpr double stamp_s = sample_stamp_s;
@@ -238,5 +237,4 @@ TEST_F(Ros1Wire, EndsThoughItsMasterHangs) {
   EXPECT_EQ(joints.count(), heard);
 }
 
-}  // namespace ros1_transport_test
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::ros1_transport_test

@@ -14,8 +14,7 @@
 #include "lapservo/testing/wait_for.h"
 #include "transports/ros2/ros2_transport.h"
 
-namespace lapservo::internal {
-namespace fastdds_test {
+namespace lapservo::internal::fastdds_test {
 using testing::wait_for;
 using Clock = std::chrono::steady_clock;
 
@@ -80,5 +79,4 @@ TEST(FastDds, ALoopThatEndsIsMissedAtOnce) {
   EXPECT_TRUE(arm.says("writers 0"));
 }
 
-}  // namespace fastdds_test
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::fastdds_test

@@ -14,8 +14,7 @@
 #include "transports/ros2/test_dds_peer.h"
 #include "transports/ros2/wire.h"
 
-namespace lapservo::internal {
-namespace reading_test {
+namespace lapservo::internal::reading_test {
 
 const std::string topic = "/PSM1/topic";
 
@@ -118,5 +117,4 @@ TEST(Reading, AStopIsHeardThoughAnotherFloodsItsTopic) {
   }
 }
 
-}  // namespace reading_test
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::reading_test

@@ -18,8 +18,7 @@
 #include "transports/ros2/test_dds_peer.h"
 #include "transports/ros2/wire.h"
 
-namespace lapservo::internal {
-namespace wire_bytes_test {
+namespace lapservo::internal::wire_bytes_test {
 
 using eprosima::fastcdr::Cdr;
 using Fields = std::map<std::string, std::string>;  // by name: pose.pose.position.x, status[0].values[1].key
@@ -196,5 +195,4 @@ TEST(WireBytes, OfWhatTheLoopTells) {
                 "feature_covariance[1] 6, edges_px[7] 7, action track, reason , error[3] 11");
 }
 
-}  // namespace wire_bytes_test
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::wire_bytes_test
