@@ -61,6 +61,12 @@ TEST(YamlField, NamesTheKindOfFileThatWasExpected) {
   EXPECT_EQ(input_error([] { parse(std::string((1 << 20) + 1, ' ')); }),
             "a.yaml: is larger than 1 MiB, expected a file of ours");
   EXPECT_EQ(input_error([] { parse(std::string(16, '[') + std::string(16, ']')); }), "");
+  std::string nested, ruler(3000, '-');
+  for (int i = 0; i < 3000; ++i) nested += "- ";
+  EXPECT_EQ(input_error([&] { parse(nested); }), "a.yaml: nests more deeply than a file of ours does");
+  EXPECT_EQ(input_error([&] { parse("# " + ruler + "\na: 1"); }), "");
+  for (const char* text : {"a: b: c", "a: [1, 2"})
+    EXPECT_TRUE(input_error([&] { parse(text); }).starts_with("a.yaml: is not YAML: ")) << text;
 }
 
 // yaml-cpp 0.7's LoadAll never returns from the first two.
