@@ -158,22 +158,5 @@ TEST_F(FrameDiagnosisTest, NamesFlawedFramesBeforeAllElse) {
   expect_names(half.text(), "the frames are dark");
 }
 
-// As a marker that is mounted the wrong way round: its axis meets the RCM at the other end.
-TEST_F(FrameDiagnosisTest, NamesAMarkerThatPointsAwayFromTheTip) {
-  Rig reversed = rig;
-  Rigid3& camera_from_rcm = *reversed.instruments[0].camera_from_rcm;
-  const JointVector q{0, 1.57, 0.09, 0};
-  camera_from_rcm.translation = camera_from_rcm * (rcm_from_unrolled(q) * Eigen::Vector3d(0, 0, 2 * q.rho_m));
-  expect_names(text(reversed, [](cv::Mat&) {}), "the marker points away from the tip");
-}
-
-TEST_F(FrameDiagnosisTest, SaysByHowMuchTheShaftMissesTheRcm) {
-  Rig shifted = rig;
-  shifted.instruments[0].camera_from_rcm->translation += Eigen::Vector3d(0.02, 0.02, 0);
-  const std::string line = text(shifted, [](cv::Mat&) {});
-  expect_names(line, "misses the rig's RCM, by ");
-  expect_names(line, "calibrate registration");
-}
-
 }  // namespace
 }  // namespace lapservo::internal
