@@ -23,10 +23,11 @@ std::string bound_text(std::string_view limit, std::string_view name, double bou
 
 std::optional<std::string> broken_joint_limit(const JointLimits& limits, const Eigen::Vector4d& q,
                                               const Eigen::Vector4d& velocity) {
+  constexpr double rounding = 1e-6;  // rad, m: of a place on the limit itself
   for (int i = 0; i < 4; ++i) {
     const std::string_view name = JointVector::names[static_cast<std::size_t>(i)];
-    if (q[i] < limits.lower[i]) return bound_text("limits.lower", name, limits.lower[i], q[i]);
-    if (q[i] > limits.upper[i]) return bound_text("limits.upper", name, limits.upper[i], q[i]);
+    if (q[i] < limits.lower[i] - rounding) return bound_text("limits.lower", name, limits.lower[i], q[i]);
+    if (q[i] > limits.upper[i] + rounding) return bound_text("limits.upper", name, limits.upper[i], q[i]);
     if (std::abs(velocity[i]) > limits.rate[i]) return bound_text("limits.rate", name, limits.rate[i], velocity[i]);
   }
   return std::nullopt;

@@ -62,11 +62,11 @@ struct Reach {
     return broken_at(q->vector(), feature_rate);
   }
 
-  // To three digits of a millimetre, by draws that come ever nearer to the best one so far.
+  // A goal that is typed as this text has it is not refused. By draws that come ever nearer to the best one so far.
   std::string nearest_text(const TipGoal& goal, const Eigen::Vector4d& q_start) const {
     if (!goal.position_m.allFinite()) return "";
     constexpr int draws = 4000;
-    constexpr double last_spread = 1e-4;
+    constexpr double last_spread = 1e-3, per_m = 1e4, per_rad = 1e3;  // as many steps as the text's digits show
     const JointLimits& limits = config.limits;
     const auto wanted = goal.position_m.z() > 0 ? configuration(goal) : std::nullopt;
     const auto line = wanted ? line_at(*wanted) : std::nullopt;
@@ -74,26 +74,31 @@ struct Reach {
     if (line && (too_far || passes_seam(*wanted))) {
       const double seam_rad = wanted->psi_rad + line->tau_rad;
       return fmt::format("; rolls of {:.4g} to {:.4g} rad can be reached without the marker's seam facing the camera",
-                         std::max(limits.lower[3], seam_rad - two_pi), std::min(limits.upper[3], seam_rad));
+                         std::ceil(per_rad * std::max(limits.lower[3], seam_rad - two_pi)) / per_rad,
+                         std::floor(per_rad * std::min(limits.upper[3], seam_rad)) / per_rad);
     }
     Random random(1);
     Eigen::Vector4d best = q_start;
     if (wanted) best[3] = wanted->psi_rad;
     double best_m = std::numeric_limits<double>::infinity();
-    Eigen::Vector3d nearest_m = Eigen::Vector3d::Zero();
+    TipGoal nearest = goal;
     for (int i = 0; i < draws; ++i) {
       const double spread = std::pow(last_spread, i / (draws - 1.0));
       Eigen::Vector4d q = i == 1 && wanted ? wanted->vector() : best;
       for (int k = 0; k < 3 && i > 1; ++k) q[k] += spread * random.normal() * (limits.upper[k] - limits.lower[k]) / 2;
       q = q.cwiseMax(limits.lower).cwiseMin(limits.upper);
       const auto tip_m = tips.tip_at(JointVector::from_vector(q));
-      const double away_m = tip_m ? (*tip_m - goal.position_m).norm() : best_m;
-      if (!(away_m < best_m) || !(tip_m->z() > 0) || broken_at(q, Eigen::Vector4d::Zero())) continue;
-      best = q, best_m = away_m, nearest_m = *tip_m;
+      if (!tip_m) continue;
+      TipGoal shown = goal;
+      shown.position_m = (per_m * *tip_m).array().round() / per_m;
+      const double away_m = (shown.position_m - goal.position_m).norm();
+      if (!(away_m < best_m) || broken(shown, Eigen::Vector4d::Zero())) continue;
+      best = q, best_m = away_m, nearest = shown;
     }
     if (!std::isfinite(best_m)) return "; no place of the tip can be reached";
-    return fmt::format("; the nearest that can be reached is {:.4f},{:.4f},{:.4f}, {:.1f} mm away", nearest_m.x(),
-                       nearest_m.y(), nearest_m.z(), 1e3 * best_m);
+    const Eigen::Vector3d& place_m = nearest.position_m;
+    return fmt::format("; the nearest that can be reached is {:.4f},{:.4f},{:.4f}{}, {:.1f} mm away", place_m.x(),
+                       place_m.y(), place_m.z(), goal.roll_rad ? fmt::format(",{}", *goal.roll_rad) : "", 1e3 * best_m);
   }
 };
 

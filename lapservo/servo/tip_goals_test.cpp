@@ -316,8 +316,8 @@ TEST_F(Refusals, GoalsOutOfReachHaveTheNearestThatIsNot) {
     const auto nearest = nearest_in(text);
     ASSERT_TRUE(nearest);
     const double away_m = (*nearest - goal.position_m).norm();
-    TipGoal moved = goal;
-    if (goal.roll_rad) moved.roll_rad = limits.upper[3];
+    TipGoal moved{*nearest};
+    EXPECT_EQ(refused(moved), "");
     int nearer = 0;
     for (int i = 0; i < 60; ++i) {
       const Eigen::Vector3d by(random.normal(), random.normal(), random.normal());
@@ -369,8 +369,9 @@ TEST_F(Refusals, ARollCountsByTheTurnToWhichTheFeaturesLead) {
   } goals[] = {{1.2, -1.5, ""},
                {1.2, -1.8, "limits.upper psi_rad 4: needs 4.483"},  // within the limits, and not reached
                {1.2, two_pi - 1.5, ""},
+               {1.2, -1.571, ""},  // the ends that are said
+               {1.2, 4, ""},
                {3.5, -1, ""},  // by the longer way
-               {3.5, two_pi - 1, ""},
                {-3, -1.8, ""},
                {-3, 2.5, ""},
                {-3, 1.2, "limits.lower psi_rad -4: needs -5.083"}};
