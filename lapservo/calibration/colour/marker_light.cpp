@@ -10,7 +10,7 @@
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/marker/azimuths.h"
 #include "lapservo/vision/colour/colour_classes.h"
-#include "lapservo/vision/edges/edge_profile.h"
+#include "lapservo/vision/edges/edge_lines.h"
 #include "lapservo/vision/image/light_image.h"
 
 namespace lapservo::internal {
@@ -54,52 +54,51 @@ std::vector<Place> places_of(const Camera& camera, const Marker& marker, const S
   return places;
 }
 
-// False where light is clipped.
-bool sample(const LightImage& light, const Place& place, EdgeProfile& profile) {
-  if (!light.contains(place.centre_px - reach_px * place.direction) ||
-      !light.contains(place.centre_px + reach_px * place.direction))
-    return false;
-  profile.first_px = -reach_px, profile.count = 2 * reach_px + 1;
-  for (std::size_t i = 0; i < profile.count; ++i) {
-    const Eigen::Vector2f at = (place.centre_px + (static_cast<double>(i) - reach_px) * place.direction).cast<float>();
-    const auto seen = light.at(at.x(), at.y());
-    for (std::size_t c = 0; c < 3; ++c) {
-      if (seen.saturated[c]) return false;
-      profile.light[c][i] = seen.light[c], profile.usable[c][i] = true;
+// The lines through them that lie inside the image and show no clipped light.
+std::vector<EdgeLine> lines_of(const LightImage& light, const std::vector<Place>& places) {
+  std::vector<EdgeLine> lines;
+  for (const Place& place : places) {
+    const Eigen::Vector2f at = place.centre_px.cast<float>(), along = place.direction.cast<float>();
+    bool clear = light.contains(place.centre_px - reach_px * place.direction) &&
+                 light.contains(place.centre_px + reach_px * place.direction);
+    for (int i = -reach_px; clear && i <= reach_px; ++i) {
+      const Eigen::Vector2f px = at + static_cast<float>(i) * along;
+      const auto saturated = light.at(px.x(), px.y()).saturated;
+      clear = !saturated[0] && !saturated[1] && !saturated[2];
     }
+    if (clear) lines.push_back({at.x(), at.y(), along.x(), along.y(), reach_px, reach_px, blur_px});
   }
-  return true;
+  return lines;
 }
 
-// Where a channel's edge lies along the profile, and how much light changes there; nullopt where it has none.
-struct ChannelEdge {
-  double offset_px, change;
-};
-std::optional<ChannelEdge> edge_of(EdgeProfile profile, std::size_t channel) {
-  for (std::size_t c = 0; c < 3; ++c)
-    if (c != channel) profile.usable[c].fill(false);
-  const EdgeFit fit = fit_step(profile, blur_px, 8);
-  if (!fit.converged || std::abs(fit.offset_px) > 2) return std::nullopt;
-  return ChannelEdge{static_cast<double>(fit.offset_px), static_cast<double>(fit.step[channel])};
+// Where each channel shows an edge, if it shows it, and by how much its light changes there.
+using ChannelEdges = std::array<EdgeFit, 3>;
+
+// `alone`: the image with one channel, the others black.
+std::vector<ChannelEdges> edges_of(const std::array<cv::Mat, 3>& alone, const LightTable& light_of_value,
+                                   const ChannelGeometry& channels, const std::vector<EdgeLine>& lines) {
+  std::vector<ChannelEdges> edges(lines.size());
+  for (std::size_t c = 0; c < 3; ++c) {
+    const ImageView view(alone[c]);
+    const EdgeFits fits = locate_edges(LightImage(view, light_of_value, channels), lines, 8);
+    for (std::size_t i = 0; i < lines.size(); ++i) edges[i][c] = fits[i];
+  }
+  return edges;
 }
 
 // By how much the edges of channels that rise lie beyond those of channels that fall; NaN where there are not both.
-double disagreement_px(const EdgeProfile& profile) {
-  constexpr double least_part = 0.1;  // of the largest change: less is noise
-  std::array<std::optional<ChannelEdge>, 3> edges;
-  double largest = 0;
-  for (std::size_t c = 0; c < 3; ++c) {
-    edges[c] = edge_of(profile, c);
-    if (edges[c]) largest = std::max(largest, std::abs(edges[c]->change));
-  }
+double disagreement_px(const ChannelEdges& edges) {
+  constexpr float least_part = 0.1F, farthest_px = 2;  // least_part: of the largest change, less is noise
+  std::array<float, 3> change{};                       // 0 where there is no edge
+  for (std::size_t c = 0; c < 3; ++c)
+    if (edges[c].converged && std::abs(edges[c].offset_px) <= farthest_px) change[c] = edges[c].step[c];
+  const float least = least_part * std::max({std::abs(change[0]), std::abs(change[1]), std::abs(change[2])});
   double rising = 0, falling = 0;
   int rise = 0, fall = 0;
-  for (const auto& edge : edges) {
-    if (!edge || std::abs(edge->change) < least_part * largest) continue;
-    if (edge->change > 0)
-      rising += edge->offset_px, ++rise;
-    else
-      falling += edge->offset_px, ++fall;
+  for (std::size_t c = 0; c < 3; ++c) {
+    if (std::abs(change[c]) < least) continue;
+    if (change[c] > 0) rising += static_cast<double>(edges[c].offset_px), ++rise;
+    if (change[c] < 0) falling += static_cast<double>(edges[c].offset_px), ++fall;
   }
   return rise > 0 && fall > 0 ? rising / rise - falling / fall : std::nan("");
 }
@@ -125,18 +124,23 @@ MarkerResponse::MarkerResponse(const Camera& camera) : camera_(camera) {
 void MarkerResponse::add(const cv::Mat& bgr, const Marker& marker, const ShaftPose& pose) {
   const ImageView view(bgr);
   const ChannelGeometry channels(camera_);
-  for (const Place& place : places_of(camera_, marker, pose)) {
-    std::vector<double> all;
-    for (const Candidate& candidate : candidates_) {
-      EdgeProfile profile;
-      if (!sample(LightImage(view, candidate.light, channels), place, profile)) break;
-      all.push_back(disagreement_px(profile));
-      if (!std::isfinite(all.back())) break;
-    }
-    // Each edge counts for all or for none.
-    if (all.size() != candidates_.size() || !std::isfinite(all.back())) continue;
-    for (std::size_t i = 0; i < all.size(); ++i) candidates_[i].apart_px.push_back(all[i]);
+  const LightImage light(view, candidates_.front().light, channels);
+  const std::vector<EdgeLine> lines = lines_of(light, places_of(camera_, marker, pose));
+  std::array<cv::Mat, 3> alone;
+  for (int c = 0; c < 3; ++c) {
+    cv::Scalar kept;
+    kept[c] = 255;
+    cv::bitwise_and(bgr, kept, alone[static_cast<std::size_t>(c)]);
   }
+  std::vector<std::vector<double>> apart_px(lines.size());  // of each edge, by the candidates
+  for (const Candidate& candidate : candidates_) {
+    const auto edges = edges_of(alone, candidate.light, channels, lines);
+    for (std::size_t i = 0; i < lines.size(); ++i) apart_px[i].push_back(disagreement_px(edges[i]));
+  }
+  // Each edge counts for all or for none.
+  for (const std::vector<double>& apart : apart_px)
+    if (std::ranges::all_of(apart, [](double px) { return std::isfinite(px); }))
+      for (std::size_t i = 0; i < apart.size(); ++i) candidates_[i].apart_px.push_back(apart[i]);
 }
 
 std::optional<MarkerResponse::Result> MarkerResponse::result() const {

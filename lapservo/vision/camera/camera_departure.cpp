@@ -79,7 +79,7 @@ ChannelSteps channel_steps(const StepColumns& columns, const Raised& raised) {
 struct SeenBoundary {
   std::size_t boundary;
   double radial_px;                   // how far from the principal point it lies along its normal
-  Channels offset_px, weight, share;  // share: of what fit_step sees there
+  Channels offset_px, weight, share;  // share: of what locate_edges sees there
   Channels by_exponent_px;            // d(offset)/d(exponent)
   int channels;                       // that show it
 

@@ -76,12 +76,12 @@ class DepartedLight {
 
 /// Effects beyond what `light` undoes already: of lateral chromatic aberration and a response that is not the rig's,
 /// the one that explains where the three channels show the boundaries; nullopt where nothing needs explaining.
-/// `blur_px` is what fit_step was given. For processed images (picture_processing.h) it is arbitrary.
+/// `blur_px` is what locate_edges was given. For processed images (picture_processing.h) it is arbitrary.
 std::optional<CameraDeparture> find_departure(const LightImage& light, std::span<const Measurement> measurements,
                                               double blur_px);
 
 /// By how much each boundary is seen farther along its normal, by an exponent of light that is larger by 1 [px]; 0
-/// where it is not seen. `blur_px`: what fit_step was given.
+/// where it is not seen. `blur_px`: what locate_edges was given.
 std::array<double, 4> moved_by_exponent_px(const LightImage& light, std::span<const Measurement> measurements,
                                            double blur_px);
 

@@ -36,7 +36,7 @@ struct ExpectedPicture {
 /// The part of a frame's processing that matters to its boundaries.
 struct ProcessedEdges {
   PictureProcessing processing;
-  std::array<std::optional<double>, 4> bias_px;  ///< by which fit_step mislocates each boundary that was seen well
+  std::array<std::optional<double>, 4> bias_px;  ///< by which locate_edges mislocates each boundary that was seen well
   /// And each measurement of one, by those that are as bright: what the processing does to an edge goes by its light.
   std::array<float, EdgeMeasurements::most> measurement_bias_px{};
   bool clips = false;  ///< colours beside a boundary lie beyond black or white: what is visible of them shows less
@@ -51,8 +51,8 @@ bool is_processed(const PictureProcessing& processing);
 std::optional<PictureProcessing> first_guess(const LightTable& light_of_value, const PooledEdges& edges,
                                              double blur_px);
 
-/// The likeliest processing, from what all boundaries look like; such as is expected. `blur_px` is what fit_step was
-/// given. Nullopt when too little was seen.
+/// The likeliest processing, from what all boundaries look like; such as is expected. `blur_px` is what locate_edges
+/// was given. Nullopt when too little was seen.
 std::optional<ProcessedEdges> explain(const LightTable& light_of_value, const PooledEdges& edges, double blur_px,
                                       const ExpectedPicture& expected = {});
 
@@ -68,7 +68,7 @@ struct ProcessingEvidence {
   bool explained = false;               ///< it took more than a first guess
 };
 
-/// For the boundaries among `measurements`, which fit_step located with `blur_px`.
+/// For the boundaries among `measurements`, which locate_edges located with `blur_px`.
 ProcessingEvidence find_processing(const LightImage& light, std::span<const Measurement> measurements, double blur_px,
                                    const ExpectedPicture& expected = {});
 

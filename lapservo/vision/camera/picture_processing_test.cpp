@@ -79,7 +79,7 @@ TEST(PictureProcessing, IsToldFromTheBoundaries) {
   }
 }
 
-// Wherever fit_step located it and wherever the pose has it; also where most of a channel is clipped, which shows
+// Wherever locate_edges located it and wherever the pose has it; also where most of a channel is clipped, which shows
 // saturation less well.
 TEST(PictureProcessing, ABoundaryIsFoundWhereItIs) {
   const auto explained = [](const PictureProcessing& processing, double offset_px, double located_px) {

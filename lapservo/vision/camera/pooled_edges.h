@@ -43,7 +43,7 @@ struct PooledEdges {
 
 /// The averaged values: at a glance some places' encoded values, linear between pixels, which darkens what is bright
 /// beside an edge, for an eighth of the time; closely, those of all places, cubic and by brightness; or light, linear
-/// as in fit_step, which has no bias but is no value that a camera's filters worked on.
+/// as in locate_edges, which has no bias but is no value that a camera's filters worked on.
 enum class Look { glance, closely, light };
 
 /// For the boundaries among `measurements`.

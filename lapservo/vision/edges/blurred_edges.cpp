@@ -1,6 +1,7 @@
 #include "lapservo/vision/edges/blurred_edges.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numbers>
 
 namespace lapservo::internal {

@@ -1,7 +1,7 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstddef>
 
 namespace lapservo::internal {
@@ -13,7 +13,7 @@ struct BlurredEdge {
   float root_slope;  ///< d(root)/du
 };
 
-/// Tabulates them; errors below 1e-4.
+/// Tabulates them; errors below 1e-4. Beyond the table, density and step are those of its ends.
 struct BlurredEdges {
   /// Entry i holds u = first_u + i / per_sigma, up to last_u and one beyond.
   static constexpr float first_u = -6, last_u = 8;
@@ -25,12 +25,7 @@ struct BlurredEdges {
   static const BlurredEdges& instance();
 
   BlurredEdge at(float u) const {
-    if (!(u > first_u)) return {0, 0, 0, 0, 0};
-    if (u >= last_u) {  // asymptotic expansions of the moments
-      const float root = std::sqrt(u), correction = 1 / (8 * u * u);
-      return {0, 1, root * (1 - correction), root * u * (1 + 3 * correction), (1 + 3 * correction) / (2 * root)};
-    }
-    const float place = (u - first_u) * per_sigma;
+    const float place = (std::min(std::max(first_u, u), last_u) - first_u) * per_sigma;  // that of first_u for NaN
     const auto i = static_cast<std::size_t>(place);
     const float f = place - static_cast<float>(i);
     const BlurredEdge &a = entries[i], &b = entries[i + 1];

@@ -7,7 +7,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 
-#include "lapservo/vision/edges/edge_profile.h"
+#include "lapservo/vision/edges/edge_lines.h"
 
 namespace lapservo::internal {
 

@@ -26,6 +26,15 @@ using V = hn::Vec<Floats>;
 using VI = hn::Vec<Ints>;
 using Mask = hn::Mask<Floats>;
 
+// An edge with less information has no contrast.
+constexpr float min_edge_information = 1e-9F;
+// A shape that differs from the others by less than this part of its square is not set apart by it.
+constexpr float least_independent = 1e-5F;
+// Iterations end below the first; the last of several may move the edge by the second.
+constexpr float edge_tolerance_px = 0.004F, max_last_step_px = 0.25F;
+// A channel with fewer samples beyond its unknowns says nothing.
+constexpr float least_degrees = 4;
+
 // A value for every lane.
 struct Lanes {
   alignas(alignment) std::array<float, max_lanes> value;
@@ -34,18 +43,13 @@ struct Lanes {
 };
 
 // A value for every sample and lane.
-using Column = std::array<Lanes, EdgeProfile::max_samples>;
+using Column = std::array<Lanes, EdgeLine::max_samples>;
 
 // Lines side by side: lane j is one of them.
 struct LineLanes {
   Lanes u, v, du, dv, first, last, blur, radius;
   std::size_t samples = 0;  // of the longest
 };
-
-// How many samples each line has.
-V samples_of(const LineLanes& lines) {
-  return hn::Add(hn::Sub(lines.last.load(), lines.first.load()), hn::Set(Floats(), 1));
-}
 
 LineLanes lanes_of(std::span<const EdgeLine> lines, std::size_t lanes) {
   LineLanes out;
@@ -61,8 +65,8 @@ LineLanes lanes_of(std::span<const EdgeLine> lines, std::size_t lanes) {
 }
 
 struct SampledLanes {
-  std::array<Column, 3> light;
-  Lanes brightest;  // encoded value met on the way
+  std::array<Column, 3> light, present;  // present: 1 where a channel's light is known, 0 (and no light) elsewhere
+  bool alike;                            // present in all channels alike
 };
 
 // The four pixels around a place, in each lane: two words a row hold blue, green and red of both.
@@ -91,16 +95,19 @@ struct Neighbours {
   }
 };
 
-// LightImage::at() in every lane and at every sample; nothing beyond a line's end.
+// LightImage::at() in every lane and at every sample.
 template <bool Chromatic>
-SampledLanes sample(const LightImage& light, const LineLanes& lines, const Column& present) {
+SampledLanes sample(const LightImage& light, const LineLanes& lines) {
   const Floats d;
   const std::size_t lanes = hn::Lanes(d);
+  const V one = hn::Set(d, 1);
+  const VI saturated = hn::Set(Ints(), LightImage::saturated_value);
   SampledLanes out;
   Neighbours around;
   VI brightest = hn::Zero(Ints());
-  V t = lines.first.load();
-  for (std::size_t i = 0; i < lines.samples; ++i) {
+  V unlimited = lines.first.load();
+  for (std::size_t i = 0; i < lines.samples; ++i, unlimited = hn::Add(unlimited, one)) {
+    const V t = hn::Min(unlimited, lines.last.load());
     const V green_u = hn::MulAdd(t, lines.du.load(), lines.u.load());
     const V green_v = hn::MulAdd(t, lines.dv.load(), lines.v.load());
     V fu, fv;
@@ -118,18 +125,21 @@ SampledLanes sample(const LightImage& light, const LineLanes& lines, const Colum
         look_at(hn::MulAdd(magnification, hn::Sub(green_u, centre_u), centre_u),
                 hn::MulAdd(magnification, hn::Sub(green_v, centre_v), centre_v));
       }
+      VI brightest_here = hn::Zero(Ints());
       const auto at = [&](std::size_t right, std::size_t lower) HWY_ATTR {
         const VI value = around.value(c, right, lower);
-        brightest = hn::Max(brightest, value);
+        brightest_here = hn::Max(brightest_here, value);
         return hn::GatherIndex(Floats(), light.light_of_value().data(), value);
       };
       const V a = at(0, 0), b = at(1, 0), e = at(0, 1), f = at(1, 1);
       const V upper = hn::MulAdd(fu, hn::Sub(b, a), a), lower = hn::MulAdd(fu, hn::Sub(f, e), e);
-      out.light[c][i].store(hn::Mul(present[i].load(), hn::MulAdd(fv, hn::Sub(lower, upper), upper)));
+      const Mask known = hn::And(hn::Eq(t, unlimited), hn::RebindMask(d, hn::Lt(brightest_here, saturated)));
+      out.present[c][i].store(hn::IfThenElseZero(known, one));
+      out.light[c][i].store(hn::IfThenElseZero(known, hn::MulAdd(fv, hn::Sub(lower, upper), upper)));
+      brightest = hn::Max(brightest, brightest_here);
     }
-    t = hn::Min(hn::Add(t, hn::Set(d, 1)), lines.last.load());
   }
-  out.brightest.store(hn::ConvertTo(d, brightest));
+  out.alike = hn::AllTrue(Ints(), hn::Lt(brightest, saturated));
   return out;
 }
 
@@ -183,7 +193,8 @@ HWY_INLINE V dot(const Column& a, const Column& b, std::size_t samples) {
 }
 
 // The model's linear basis, a constant and then the shapes, made orthonormal; and the shapes' derivatives by the edge's
-// position and then by the blur, with the Gram matrix of what the basis can't imitate of them. For all channels.
+// position and then by the blur, with the Gram matrix of what the basis can't imitate of them. Where samples are
+// present.
 template <std::size_t Shapes>
 struct Basis {
   static constexpr std::size_t linear = Shapes + 1, derivatives = 2 * Shapes, all = linear + derivatives;
@@ -192,11 +203,12 @@ struct Basis {
   std::array<std::array<V, linear>, linear> triangle;       // of the orthogonalisation
   std::array<std::array<V, linear>, derivatives> imitated;  // of each derivative, along each unit
   std::array<std::array<V, derivatives>, derivatives> gram;
-  Mask independent;
+  V degrees;  // samples beyond the unknowns
+  Mask determined;
 
-  Basis(const LineLanes& lines, const Column& present, V edge_px) {
+  void set(const LineLanes& lines, const Column& present, V edge_px) {
     fill(lines, present, edge_px);
-    orthogonalise(lines, present);
+    orthogonalise(lines.samples);
     for (std::size_t s = 0; s < derivatives; ++s) {
       const auto products = dots<all>(columns.data(), columns[linear + s], lines.samples);
       std::copy_n(products.begin(), linear, imitated[s].begin());
@@ -209,7 +221,8 @@ struct Basis {
   }
 
  private:
-  // The shapes of edge_profile.cpp.
+  // One shape: a step. The second one: sqrt(1 - (1 - d/R)^2) = sqrt(2 d / R) (1 - d / 4R - ...), the occluding contour
+  // within a third of the radius.
   void fill(const LineLanes& lines, const Column& present, V edge_px) {
     const Floats d;
     const V one = hn::Set(d, 1), blur = lines.blur.load(), inverse_blur = hn::Div(one, blur);
@@ -226,6 +239,7 @@ struct Basis {
       const V here = present[i].load(), u = hn::Mul(from_edge, inverse_blur);
       const BlurredLanes edge = blurred_at<Shapes == 2>(table, u);
       const V slope = hn::Neg(hn::Mul(hn::Mul(here, edge.density), inverse_blur));
+      columns[0][i].store(here);
       columns[1][i].store(hn::Mul(here, edge.step));
       columns[linear][i].store(slope);
       columns[linear + Shapes][i].store(hn::Mul(slope, u));
@@ -240,25 +254,25 @@ struct Basis {
     }
   }
 
-  void orthogonalise(const LineLanes& lines, const Column& present) {
+  void orthogonalise(std::size_t samples) {
     const Floats d;
-    const std::size_t samples = lines.samples;
-    triangle[0][0] = hn::Sqrt(samples_of(lines));
-    const V constant = hn::Div(hn::Set(d, 1), triangle[0][0]);
-    for (std::size_t i = 0; i < samples; ++i) columns[0][i].store(hn::Mul(constant, present[i].load()));
-    independent = hn::Eq(constant, constant);
-    for (std::size_t j = 1; j < linear; ++j) {
+    const V one = hn::Set(d, 1);
+    for (std::size_t j = 0; j < linear; ++j) {
       Column& column = columns[j];
       const V before = dot(column, column, samples);
+      if (j == 0) {
+        degrees = hn::Sub(before, hn::Set(d, static_cast<float>(linear)));
+        determined = hn::Ge(degrees, hn::Set(d, least_degrees));
+      }
       for (std::size_t k = 0; k < j; ++k) {
         triangle[k][j] = dot(columns[k], column, samples);
         for (std::size_t i = 0; i < samples; ++i)
           column[i].store(hn::NegMulAdd(triangle[k][j], columns[k][i].load(), column[i].load()));
       }
       const V square = dot(column, column, samples);
-      independent = hn::And(independent, hn::Gt(square, hn::Mul(hn::Set(d, least_independent), before)));
-      triangle[j][j] = hn::Sqrt(square);
-      const V factor = hn::Div(hn::Set(d, 1), triangle[j][j]);
+      determined = hn::And(determined, hn::Gt(square, hn::Mul(hn::Set(d, least_independent), before)));
+      triangle[j][j] = hn::Sqrt(hn::IfThenElse(determined, square, one));
+      const V factor = hn::Div(one, triangle[j][j]);
       for (std::size_t i = 0; i < samples; ++i) column[i].store(hn::Mul(factor, column[i].load()));
     }
   }
@@ -271,30 +285,35 @@ struct FitLanes {
   Mask converged;
 };
 
-// The step of edge_profile.cpp. `squares`: the sum of the light's.
+// One variable-projection step: linear amplitudes per channel, then the position in what they leave. A channel that
+// does not determine its amplitudes counts for nothing. `squares`: of each channel's light, their sum.
 template <std::size_t Shapes>
-FitLanes project(const LineLanes& lines, const std::array<Column, 3>& light, V squares, const Column& present,
-                 V edge_px) {
+FitLanes project(const LineLanes& lines, const SampledLanes& sampled, const std::array<V, 3>& squares, V edge_px) {
   const Floats d;
   const V zero = hn::Zero(d);
-  const Basis<Shapes> basis(lines, present, edge_px);
+  Basis<Shapes> basis;
   constexpr std::size_t linear = Basis<Shapes>::linear;
   FitLanes fit;
   fit.value.fill(zero);
   // By position, then by blur.
   std::array<V, 2> gradient{zero, zero};
   std::array<std::array<V, 2>, 2> information{gradient, gradient};
+  V degrees = hn::Set(d, -1), left_squares = zero;
   for (std::size_t c = 0; c < 3; ++c) {
-    const auto products = dots<Basis<Shapes>::all>(basis.columns.data(), light[c], lines.samples);
+    if (c == 0 || !sampled.alike) basis.set(lines, sampled.present[c], edge_px);
+    const auto products = dots<Basis<Shapes>::all>(basis.columns.data(), sampled.light[c], lines.samples);
     std::array<V, linear> amplitude;
+    V left_of_channel = squares[c];
     for (std::size_t j = 0; j < linear; ++j) {
       amplitude[j] = products[j];
-      squares = hn::NegMulAdd(amplitude[j], amplitude[j], squares);
+      left_of_channel = hn::NegMulAdd(amplitude[j], amplitude[j], left_of_channel);
     }
+    degrees = hn::Add(degrees, hn::IfThenElseZero(basis.determined, basis.degrees));
+    left_squares = hn::Add(left_squares, hn::IfThenElseZero(basis.determined, left_of_channel));
     for (std::size_t j = linear; j-- > 0;) {
       for (std::size_t k = j + 1; k < linear; ++k)
         amplitude[j] = hn::NegMulAdd(basis.triangle[j][k], amplitude[k], amplitude[j]);
-      amplitude[j] = hn::Div(amplitude[j], basis.triangle[j][j]);
+      amplitude[j] = hn::IfThenElseZero(basis.determined, hn::Div(amplitude[j], basis.triangle[j][j]));
     }
     fit.value[FitLanes::before + c] = amplitude[0];
     for (std::size_t s = 0; s < Shapes; ++s) {
@@ -313,34 +332,31 @@ FitLanes project(const LineLanes& lines, const std::array<Column, 3>& light, V s
       step = hn::Add(step, a);
     }
   }
-  const V degrees =
-      hn::MulAdd(hn::Set(d, 3), hn::Sub(samples_of(lines), hn::Set(d, static_cast<float>(linear))), hn::Set(d, -1));
   const V offset = hn::Div(gradient[0], information[0][0]), both = information[0][1];
-  const V variance = hn::Div(hn::Max(zero, squares), degrees);
+  const V variance = hn::Div(hn::Max(zero, left_squares), degrees);
   fit.value[FitLanes::offset] = offset;
   fit.value[FitLanes::information] = information[0][0];
   fit.value[FitLanes::residual_variance] = variance;
   // For the blur, whatever the position is.
   fit.value[FitLanes::blur_gradient] = hn::NegMulAdd(offset, both, gradient[1]);
   fit.value[FitLanes::blur_information] = hn::NegMulAdd(hn::Div(both, information[0][0]), both, information[1][1]);
-  fit.converged =
-      hn::And(hn::And(basis.independent, hn::Gt(information[0][0], hn::Set(d, min_edge_information))),
-              hn::And(hn::Ge(degrees, hn::Set(d, 3)), hn::And(hn::IsFinite(offset), hn::IsFinite(variance))));
+  fit.converged = hn::And(hn::Gt(information[0][0], hn::Set(d, min_edge_information)),
+                          hn::And(hn::IsFinite(offset), hn::IsFinite(variance)));
   return fit;
 }
 
-// iterate() of edge_profile.cpp in every lane.
 template <std::size_t Shapes>
-FitLanes iterate(const LineLanes& lines, const std::array<Column, 3>& light, const Column& present, int iterations) {
+FitLanes iterate(const LineLanes& lines, const SampledLanes& sampled, int iterations) {
   const Floats d;
-  V squares = hn::Zero(d);
-  for (const Column& channel : light) squares = hn::Add(squares, dot(channel, channel, lines.samples));
-  const V reach = hn::Mul(hn::Set(d, 0.5F), samples_of(lines));
+  std::array<V, 3> squares;
+  for (std::size_t c = 0; c < 3; ++c) squares[c] = dot(sampled.light[c], sampled.light[c], lines.samples);
+  const V samples = hn::Add(hn::Sub(lines.last.load(), lines.first.load()), hn::Set(d, 1));
+  const V reach = hn::Mul(hn::Set(d, 0.5F), samples);
   V edge_px = hn::Zero(d);
   FitLanes fit{};
   Mask active = hn::Eq(edge_px, edge_px);
   for (int iteration = 0; iteration < iterations && !hn::AllFalse(d, active); ++iteration) {
-    const FitLanes next = project<Shapes>(lines, light, squares, present, edge_px);
+    const FitLanes next = project<Shapes>(lines, sampled, squares, edge_px);
     for (std::size_t i = 0; i < fit.value.size(); ++i)
       fit.value[i] = hn::IfThenElse(active, next.value[i], fit.value[i]);
     fit.converged = hn::Or(hn::And(active, next.converged), hn::AndNot(active, fit.converged));
@@ -361,22 +377,13 @@ template <std::size_t Shapes>
 void locate(const LightImage& image, std::span<const EdgeLine> lines, int iterations, EdgeFits& fits) {
   const Floats d;
   const LineLanes lanes = lanes_of(lines, hn::Lanes(d));
-  Column present;
-  V t = lanes.first.load();
-  for (std::size_t i = 0; i < lanes.samples; ++i, t = hn::Add(t, hn::Set(d, 1)))
-    present[i].store(hn::IfThenElseZero(hn::Le(t, lanes.last.load()), hn::Set(d, 1)));
-  const SampledLanes sampled =
-      image.channels().differs() ? sample<true>(image, lanes, present) : sample<false>(image, lanes, present);
-  const FitLanes fit = iterate<Shapes>(lanes, sampled.light, present, iterations);
+  const SampledLanes sampled = image.channels().differs() ? sample<true>(image, lanes) : sample<false>(image, lanes);
+  const FitLanes fit = iterate<Shapes>(lanes, sampled, iterations);
   std::array<Lanes, std::tuple_size_v<decltype(fit.value)>> values;
   for (std::size_t i = 0; i < values.size(); ++i) values[i].store(fit.value[i]);
   Lanes converged;
   converged.store(hn::IfThenElseZero(fit.converged, hn::Set(d, 1)));
   for (std::size_t j = 0; j < lines.size(); ++j) {
-    if (sampled.brightest.value[j] >= LightImage::saturated_value) {
-      fits.push_back(locate_edge(image, lines[j], iterations));
-      continue;
-    }
     const auto of = [&](FitLanes::Value value, std::size_t c = 0) { return values[value + c].value[j]; };
     const auto bgr_of = [&](FitLanes::Value value) { return std::array{of(value), of(value, 1), of(value, 2)}; };
     using enum FitLanes::Value;
@@ -404,22 +411,6 @@ HWY_AFTER_NAMESPACE();
 namespace lapservo::internal {
 
 HWY_EXPORT(locate_edges);
-
-EdgeFit locate_edge(const LightImage& light, const EdgeLine& line, int iterations) {
-  EdgeProfile profile;
-  profile.first_px = static_cast<float>(-line.before);
-  profile.count = static_cast<std::size_t>(line.before + line.after + 1);
-  for (std::size_t i = 0; i < profile.count; ++i) {
-    const float t = profile.first_px + static_cast<float>(i);
-    const LightImage::Sample sample = light.at(line.u_px + t * line.du, line.v_px + t * line.dv);
-    for (std::size_t c = 0; c < 3; ++c) {
-      profile.light[c][i] = sample.light[c];
-      profile.usable[c][i] = !sample.saturated[c];
-    }
-  }
-  return line.contour_radius_px > 0 ? fit_contour(profile, line.blur_px, line.contour_radius_px, iterations)
-                                    : fit_step(profile, line.blur_px, iterations);
-}
 
 EdgeFits locate_edges(const LightImage& light, std::span<const EdgeLine> lines, int iterations) {
   return HWY_DYNAMIC_DISPATCH(locate_edges)(light, lines, iterations);

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <hwy/highway.h>
 #include <hwy/targets.h>
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -11,28 +13,157 @@
 #include <opencv2/core.hpp>
 
 #include "lapservo/core/random.h"
+#include "lapservo/vision/edges/test_profile.h"
 
 namespace lapservo::internal {
 namespace {
 
+using Shape = std::function<double(double)>;  // light at a distance from the edge, 0 to 1
+
+constexpr std::array usual_floor{0.02, 0.05, 0.1}, usual_rise{0.5, 0.3, -0.06};
+
+TestProfile profile_of(const Shape& shape, double offset_px, int reach_px, double noise = 0, std::uint64_t seed = 0) {
+  Random random(seed);
+  TestProfile profile{.reach = reach_px};
+  for (int i = 0; i < profile.count; ++i) {
+    const double here = shape(i - reach_px - offset_px);
+    for (std::size_t c = 0; c < 3; ++c)
+      profile.light[static_cast<std::size_t>(i)][c] =
+          static_cast<float>(usual_floor[c] + usual_rise[c] * here + noise * random.normal());
+  }
+  return profile;
+}
+
+Shape step(double blur_px) {
+  return [blur_px](double x) { return 0.5 * std::erfc(-x / blur_px / std::numbers::sqrt2); };
+}
+
+// Ambient plus diffuse light of a cylinder, blurred by numeric convolution.
+Shape contour(double blur_px, double radius_px) {
+  return [=](double x) {
+    constexpr int count = 800;
+    double sum = 0;
+    for (int i = 0; i < count; ++i) {
+      const double t = 6 * (2 * (i + 0.5) / count - 1), at = (x - t * blur_px) / radius_px;
+      const double shade = at <= 0 ? 0 : 0.25 + 0.75 * std::sqrt(std::max(0.0, 1 - (1 - at) * (1 - at)));
+      sum += shade * std::exp(-t * t / 2) * 12 / count;
+    }
+    return sum / std::sqrt(2 * pi);
+  };
+}
+
+TEST(EdgeFit, AStepIsFoundWhereItIs) {
+  for (const double blur_px : {0.8, 1.2, 2.0})
+    for (double edge_px = -3; edge_px <= 3; edge_px += 0.37) {
+      const EdgeFit fit = profile_of(step(blur_px), edge_px, 10).fit(static_cast<float>(blur_px), 8);
+      ASSERT_TRUE(fit.converged) << blur_px << ", " << edge_px;
+      EXPECT_NEAR(fit.offset_px, edge_px, 0.003) << blur_px;
+      for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(fit.step[c], usual_rise[c], 0.002) << blur_px;
+    }
+}
+
+TEST(EdgeFit, TheErrorIsAsPredicted) {
+  constexpr double noise = 0.005, blur_px = 1.2;
+  constexpr int profiles = 1500;
+  for (const float radius_px : {0.0F, 45.0F}) {
+    const Shape shape = radius_px > 0 ? contour(blur_px, static_cast<double>(radius_px)) : step(blur_px);
+    double sum = 0, squares = 0, variances = 0;
+    for (std::uint64_t seed = 1; seed <= profiles; ++seed) {
+      const double offset_px = Random(seed + 10000).uniform(-1, 1);
+      const EdgeFit fit = profile_of(shape, offset_px, 12, noise, seed).fit(blur_px, 6, radius_px);
+      ASSERT_TRUE(fit.converged) << "seed " << seed;
+      const double sigmas = (fit.offset_px - offset_px) * std::sqrt(fit.information) / noise;
+      sum += sigmas, squares += sigmas * sigmas, variances += fit.residual_variance;
+    }
+    EXPECT_NEAR(sum / profiles, 0, 0.1) << radius_px;
+    EXPECT_NEAR(std::sqrt(squares / profiles), 1, 0.06) << radius_px;
+    EXPECT_NEAR(std::sqrt(variances / profiles), noise, 0.03 * noise) << radius_px;
+  }
+}
+
+TEST(EdgeFit, AContourIsFoundWhereItsTrueEdgeIs) {
+  for (const double radius_px : {25.0, 45.0, 70.0})
+    for (const double blur_px : {0.9, 1.5})
+      for (const double edge_px : {-0.8, 0.0, 0.45}) {
+        const TestProfile profile = profile_of(contour(blur_px, radius_px), edge_px, 8);
+        const EdgeFit fit = profile.fit(static_cast<float>(blur_px), 8, static_cast<float>(radius_px));
+        ASSERT_TRUE(fit.converged) << radius_px << ", " << blur_px;
+        EXPECT_NEAR(fit.offset_px, edge_px, 0.03) << radius_px << ", " << blur_px;
+        const EdgeFit as_step = profile.fit(static_cast<float>(blur_px), 8);
+        EXPECT_GT(as_step.offset_px, edge_px + 0.3) << "the apparent edge lies inside the true one";
+      }
+}
+
+// A contour's blur moves its edge, so one step to both is needed: to the blur as if the place were known leads part of
+// the way.
+TEST(EdgeFit, OneStepFindsTheBlur) {
+  for (const double radius_px : {0.0, 14.0, 45.0})
+    for (const double blur_px : {0.9, 1.2, 1.6})
+      for (const double assumed_px : {0.9 * blur_px, 1.15 * blur_px}) {
+        const int reach_px = radius_px > 0 ? static_cast<int>(0.34 * radius_px) : 10;
+        const Shape shape = radius_px > 0 ? contour(blur_px, radius_px) : step(blur_px);
+        const EdgeFit fit =
+            profile_of(shape, 0, reach_px).fit(static_cast<float>(assumed_px), 8, static_cast<float>(radius_px));
+        ASSERT_TRUE(fit.converged);
+        EXPECT_NEAR(assumed_px + fit.blur_gradient / fit.blur_information, blur_px,
+                    0.25 * std::abs(assumed_px - blur_px))
+            << radius_px << ", " << assumed_px;
+      }
+}
+
+// Clipped light is no measurement: whatever stands there changes nothing, and the edge stays in place. A channel of
+// which too few samples are left says nothing.
+TEST(EdgeFit, SaturatedSamplesAreDropped) {
+  TestProfile profile = profile_of(step(1.2), 0.6, 9, 0.003, 5);
+  profile.clipped_from[0] = 13;
+  const EdgeFit fit = profile.fit(1.2F, 8);
+  ASSERT_TRUE(fit.converged);
+  EXPECT_NEAR(fit.offset_px, 0.6, 4 * 0.003 / std::sqrt(fit.information));
+  for (const float clipped : {0.0F, 0.4F, 1.0F, 1e6F}) {
+    profile.clipped_light = clipped;
+    const EdgeFit same = profile.fit(1.2F, 8);
+    EXPECT_EQ(same.offset_px, fit.offset_px) << clipped;
+    EXPECT_EQ(same.residual_variance, fit.residual_variance) << clipped;
+    EXPECT_EQ(same.blur_gradient, fit.blur_gradient) << clipped;
+  }
+  profile.clipped_from[0] = 0;
+  const EdgeFit without = profile.fit(1.2F, 8);
+  profile.clipped_from[0] = 6;
+  const EdgeFit with_few = profile.fit(1.2F, 8);
+  EXPECT_EQ(with_few.offset_px, without.offset_px);
+  EXPECT_EQ(with_few.residual_variance, without.residual_variance);
+  EXPECT_EQ(with_few.step[0], 0);
+}
+
+// A channel that is gone takes its information with it and nothing else.
+TEST(EdgeFit, InformationAddsUpOverTheChannels) {
+  const TestProfile profile = profile_of(step(1.2), 0, 9);
+  float sum = 0;
+  for (std::size_t only = 0; only < 3; ++only) {
+    TestProfile part = profile;
+    part.clipped_from.fill(0);
+    part.clipped_from[only] = part.count;
+    const EdgeFit fit = part.fit(1.2F, 1);
+    sum += fit.information;
+    for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(fit.step[c], c == only ? usual_rise[c] : 0, 1e-4);
+  }
+  EXPECT_NEAR(sum, profile.fit(1.2F, 1).information, 1e-3F * sum);
+}
+
 constexpr double edge_px = 60.3, blur_px = 1.2, radius_px = 45;
 
-// Light that rises at edge_px from the left, as a step or as a cylinder's occluding contour, with noise; and bright
-// spots.
-cv::Mat picture(bool contour, std::uint64_t seed, int spots = 0) {
+// Light that rises at edge_px from the left, with noise; and bright spots.
+cv::Mat picture(bool limb, std::uint64_t seed, int spots = 0) {
   const Response response;
+  const Shape shape = limb ? contour(blur_px, radius_px) : step(blur_px);
   Random random(seed);
   cv::Mat image(100, 140, CV_8UC3);
-  for (int v = 0; v < image.rows; ++v)
-    for (int u = 0; u < image.cols; ++u)
-      for (int c = 0; c < 3; ++c) {
-        const double x = u - edge_px, from_axis = 1 - std::clamp(x / radius_px, 0.0, 1.0);
-        const double shade = contour ? (x > 0 ? 0.25 + 0.75 * std::sqrt(1 - from_axis * from_axis) : 0)
-                                     : 0.5 * std::erfc(-x / blur_px / std::sqrt(2.0));
-        const double light = 0.05 + (0.4 - 0.1 * c) * shade;
-        const double value = 255 * response.value_from_light(light) + 1.5 * random.normal();
-        image.at<cv::Vec3b>(v, u)[c] = cv::saturate_cast<std::uint8_t>(value);
-      }
+  for (int u = 0; u < image.cols; ++u)
+    for (int c = 0; c < 3; ++c) {
+      const double value = 255 * response.value_from_light(0.05 + (0.4 - 0.1 * c) * shape(u - edge_px));
+      for (int v = 0; v < image.rows; ++v)
+        image.at<cv::Vec3b>(v, u)[c] = cv::saturate_cast<std::uint8_t>(value + 1.5 * random.normal());
+    }
   for (int i = 0; i < spots; ++i)
     image.at<cv::Vec3b>(static_cast<int>(random.uniform(0, image.rows)), static_cast<int>(random.uniform(50, 75))) = {
         255, 255, 255};
@@ -101,12 +232,14 @@ TEST_P(EdgeLines, TogetherAreAsOneByOneOnEveryProcessor) {
       for (const std::size_t count : {1U, 7U, 16U, 61U})
         for (const int iterations : {1, 3}) {
           const auto lines = random_lines(count, GetParam(), seed + 100 * count);
+          std::vector<EdgeFit> one_by_one;
+          for (const EdgeLine& line : lines) one_by_one.push_back(locate_edges(light, {&line, 1}, iterations)[0]);
           on_every_target([&] {
             const EdgeFits fits = locate_edges(light, lines, iterations);
             ASSERT_EQ(fits.size(), count);
             for (std::size_t i = 0; i < count; ++i) {
               SCOPED_TRACE("line " + std::to_string(i));
-              expect_same(locate_edge(light, lines[i], iterations), fits[i]);
+              expect_same(one_by_one[i], fits[i]);
               ++located, converged += fits[i].converged;
             }
           });

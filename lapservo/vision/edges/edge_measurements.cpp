@@ -170,8 +170,8 @@ std::optional<BoundaryPlace> place_boundary(const Frame& frame, const Neighbourh
   const double after_m = k < 3 ? along_m[k + 1] - along_m[k] : HUGE_VAL;
   const double own_px = 0.6 * (std::min(before_m, after_m) * px_per_m);  // where it shows alone
   const double blur_px = blur.along_normal_px(place.normal), line_blur_px = blur_px / cosine;
-  const int reach = static_cast<int>(std::min({edge_limits.blur_reach * line_blur_px + effort.extra_px,
-                                               own_px - line_blur_px, double{EdgeProfile::max_reach}}));
+  const int reach = static_cast<int>(std::min(
+      {edge_limits.blur_reach * line_blur_px + effort.extra_px, own_px - line_blur_px, double{EdgeLine::max_reach}}));
   if (reach < 3) return std::nullopt;
   const Eigen::Vector3d pull = image.d_px_d_point.transpose() * normal;
   place.film_px_per_m = -pull.dot(generatrix.outwards);

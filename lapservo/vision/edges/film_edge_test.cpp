@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/core/random.h"
-#include "lapservo/vision/edges/edge_profile.h"
+#include "lapservo/vision/edges/test_profile.h"
 
 namespace lapservo::internal {
 namespace {
@@ -85,15 +85,13 @@ double blurred(double from_edge_px) {
 // Shaft, the film's edge from 0 to `width`, the outside; blurred by a pixel. By what fraction of the width inwards a
 // step is located.
 double located(double level, double width_px) {
-  EdgeProfile profile;
-  profile.first_px = -5, profile.count = 11;
-  for (std::size_t c = 0; c < 3; ++c)
-    for (std::size_t i = 0; i < profile.count; ++i) {
-      const double x = profile.first_px + static_cast<double>(i) + 0.5 * width_px;
-      profile.light[c][i] = static_cast<float>(0.05 + 0.3 * (level * blurred(x) + (1 - level) * blurred(x - width_px)));
-      profile.usable[c][i] = true;
-    }
-  const EdgeFit fit = fit_step(profile, 1, 20);
+  TestProfile profile{.reach = 5};
+  for (int i = 0; i < profile.count; ++i) {
+    const double x = i - profile.reach + 0.5 * width_px;
+    profile.light[static_cast<std::size_t>(i)].fill(
+        static_cast<float>(0.05 + 0.3 * (level * blurred(x) + (1 - level) * blurred(x - width_px))));
+  }
+  const EdgeFit fit = profile.fit(1, 20);
   EXPECT_TRUE(fit.converged);
   return 0.5 - fit.offset_px / width_px;
 }
