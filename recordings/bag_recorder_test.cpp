@@ -1,6 +1,8 @@
 #include "recordings/bag_recorder.h"
 
 #include <limits>
+#include <map>
+#include <string>
 #include <thread>
 #include <variant>
 #include <vector>
@@ -93,7 +95,7 @@ TEST(BagRecorder, NeverGoesOverSomethingAndLeavesNothingOfNothing) {
   BagRecorder(folder / "bag").finish();
 }
 
-TEST(BagRecorder, RecordsFromSeveralThreads) {
+TEST(BagRecorder, RecordsFromSeveralThreadsTheFirstSenderOfATopic) {
   const lapservo::testing::TemporaryFolder folder;
   constexpr int count = 200;
   BagRecorder recorder(folder / "bag");
@@ -104,13 +106,18 @@ TEST(BagRecorder, RecordsFromSeveralThreads) {
   arm.join();
   recorder.add("/image", image_at(std::numeric_limits<double>::quiet_NaN()));
   recorder.add("/image", image_at(0));
+  JointMessage of_another = joints_at(begin_s + count);
+  of_another.source = 1;
+  recorder.add("/PSM1/measured_js", joints_at(begin_s + count));
+  recorder.add("/PSM1/measured_js", of_another);
   recorder.finish();
+  EXPECT_EQ(recorder.counts().of_second_senders, (std::map<std::string, long>{{"/PSM1/measured_js", 1}}));
   EXPECT_EQ(recorder.counts().images, count);
   EXPECT_EQ(recorder.counts().arrived, count);
-  EXPECT_EQ(recorder.counts().joints, count);
+  EXPECT_EQ(recorder.counts().joints, count + 1);
   EXPECT_EQ(recorder.counts().unstamped, 2);
   const auto bag = open_bag((folder / "bag").string());
-  EXPECT_EQ(all(*bag, "/PSM1/measured_js").size(), static_cast<std::size_t>(count));
+  EXPECT_EQ(all(*bag, "/PSM1/measured_js").size(), static_cast<std::size_t>(count + 1));
   const auto images = all(*bag, "/image");
   ASSERT_EQ(images.size(), static_cast<std::size_t>(count));
   for (int i = 0; i < count; ++i) EXPECT_EQ(std::get<ImageMessage>(images[i]).stamp_s, begin_s + i);

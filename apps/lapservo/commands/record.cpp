@@ -47,7 +47,7 @@ constexpr double least_swing = 1.2;  // of least_joint_travel: what growing and 
 class Recording {
  public:
   Recording(const RecordOptions& options, const std::optional<Rig>& rig, Transports& transports, const Clock& clock)
-      : fps_(options.fps), recorder_(options.out) {
+      : recorder_(options.out, options.fps) {
     if (!options.robot.empty()) subscribe_joints(transports, address_of(options.robot, "--robot"));
     const cv::Size size = rig ? cv::Size(rig->camera.width_px, rig->camera.height_px) : cv::Size();
     input_ = open_images(options.camera, "--camera", size, transports, sink_of(options.camera, clock));
@@ -62,13 +62,6 @@ class Recording {
   std::optional<std::string> ended() const { return input_.ended(); }
 
  private:
-  template <typename Image>
-  void add(const std::string& topic, Image&& message) {
-    // A stream that is a little faster is kept whole.
-    if (message.stamp_s < next_image_s_ && message.stamp_s > next_image_s_ - 2 / fps_) return;
-    next_image_s_ = message.stamp_s + 0.75 / fps_;
-    recorder_.add(topic, std::forward<Image>(message));
-  }
   void subscribe_joints(Transports& transports, const Address& arm) {
     const std::string topic = topic_of(arm.name, "measured_js");
     joints_ =
@@ -82,12 +75,11 @@ class Recording {
               // Those of this computer's cameras are on the monotonic clock, or missing; joints' are on that of 1970.
               const double age_s = std::isfinite(message.stamp_s) ? clock.now_s() - message.stamp_s : 0;
               if (!has_stamps) message.stamp_s = since_1970_s() - age_s;
-              add(topic, std::move(message));
+              recorder_.add(topic, std::move(message));
             },
-            [this, topic](CompressedImageMessage&& message) { add(topic, std::move(message)); }};
+            [this, topic](CompressedImageMessage&& message) { recorder_.add(topic, std::move(message)); }};
   }
 
-  double fps_, next_image_s_ = 0;
   BagRecorder recorder_;
   Transport::Subscription joints_;  // these last: they use the recorder
   ImageInput input_;
@@ -204,7 +196,17 @@ std::string told(const RecordedCounts& counts) {
   if (counts.dropped > 0)
     text += fmt::format(", {} images dropped: the disk or the processor is too slow", counts.dropped);
   if (counts.unstamped > 0) text += fmt::format(", {} messages without a stamp left out", counts.unstamped);
+  for (const auto& [topic, count] : counts.of_second_senders)
+    text += fmt::format(", {} messages of a second sender of {} left out", count, topic);
   return text;
+}
+
+// Once for each topic.
+void say_second_senders(const RecordedCounts& counts) {
+  for (const auto& [topic, count] : counts.of_second_senders)
+    say_remark(topic,
+               "another program publishes it, too: its messages are left out until the first one has been silent for "
+               "0.5 s");
 }
 
 // `unpublished`: see Transports.
@@ -226,6 +228,7 @@ std::string wait_for_end(const RecordOptions& options, const Clock& clock, Recor
   while (!interrupted()) {
     recording.check();
     const RecordedCounts counts = recording.counts();
+    say_second_senders(counts);
     const double now_s = clock.now_s();
     if (std::exchange(images, counts.arrived) != counts.arrived)
       last_image_s = now_s;  // a slow disk is no silent camera
