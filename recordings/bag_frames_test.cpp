@@ -150,3 +150,16 @@ TEST(BagJoints, ThatCanNotBeUsedAreRefused) {
 
 }  // namespace
 }  // namespace lapservo::internal
+TEST(BagJoints, OfTwoArmsOnOneTopicAreRefused) {
+  std::vector<JointMessage> readings;
+  for (const double other : {0.0, 0.02}) {
+    readings.clear();
+    for (int i = 0; i < 100; ++i) {
+      const double b = 0.3 * std::sin(0.05 * i) + i % 2 * other;
+      readings.push_back({100 + 0.01 * i, {"a", "b", "c", "d"}, {b, 0.1, 0.1, 0.05}});
+    }
+    const std::string error = input_error([&] { BagOfJoints(readings).read(); });
+    EXPECT_EQ(error.find("two arms publish there") != std::string::npos, other > 0) << error;
+  }
+}
+

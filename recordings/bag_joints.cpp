@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "lapservo/control/wild_joints.h"
 #include "lapservo/core/error.h"
 #include "lapservo/crtk/joint_map.h"
 #include "recordings/stamped_messages.h"
@@ -42,6 +43,21 @@ void check_clock(const JointRecording& recording, double begin_s, const std::str
                                "the time since a computer's start, expected both since 1970 (let the driver stamp "
                                "by ROS's clock, and record again)",
                                joints_s, begin_s, images_by_start ? "images" : "joints"));
+}
+
+// Two arms on one topic are each where the other can't have come from.
+void expect_one_arm(const JointRecording& recording, JointsOf whose, const std::string& source) {
+  constexpr std::size_t least = 10, one_of = 20;  // some wild readings are those of a bad encoder
+  WildJoints joints({2, 2, whose == JointsOf::arm ? 0.3 : 6, 6});
+  std::size_t apart = 0;
+  for (std::size_t i = 0; i < recording.time_s.size(); ++i)
+    apart += joints.validate(recording.time_s[i], Eigen::Vector4d(recording.joints[i].data())) !=
+             WildJoints::Verdict::plausible;
+  if (apart < least || one_of * apart < recording.time_s.size()) return;
+  throw InputError(source,
+                   fmt::format("goes back and forth, in {} of {} readings farther than an arm moves: two arms publish "
+                               "there, expected one (record each of them on a topic of its own)",
+                               apart, recording.time_s.size()));
 }
 
 // The lead of a topic's stamps over the recorder's clock.
@@ -107,6 +123,7 @@ JointRecording joints_in_bag(const Bag& bag, const BagTopic& topic, const Joints
     throw InputError(source, fmt::format("has {} readings that are numbers with a stamp, expected two or more",
                                          recording.time_s.size()));
   if (begin_s) check_clock(recording, *begin_s, source);
+  expect_one_arm(recording, whose, source);
   check_units(recording, joints, source, whose);
   return recording;
 }

@@ -14,8 +14,8 @@ std::vector<std::string> joint_names_in_bag(const Bag& bag, const BagTopic& topi
 
 /// The arm's or wrist's joints in a bag's topic, by the times of their headers' stamps (stamped_messages.h) after
 /// `begin_s`, or after the first reading where nothing else has such stamps. Readings that are no numbers are left out,
-/// too. Throws InputError for messages without one of the joints or with one twice, for fewer than two readings, and
-/// where only one of joints and images is stamped since 1970.
+/// too. Throws InputError for messages without one of the joints or with one twice, for fewer than two readings, for
+/// those of two arms, and where only one of joints and images is stamped since 1970.
 JointRecording joints_in_bag(const Bag& bag, const BagTopic& topic, const Joints& joints, std::optional<double> begin_s,
                              JointsOf whose = JointsOf::arm);
 

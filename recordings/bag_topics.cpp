@@ -1,6 +1,9 @@
 #include "recordings/bag_topics.h"
 
+#include <algorithm>
 #include <functional>
+#include <iterator>
+#include <string>
 #include <vector>
 
 #include <fmt/format.h>
@@ -9,6 +12,8 @@
 
 namespace lapservo::internal {
 namespace {
+
+const std::string measured = "/measured_js";
 
 using Topics = std::vector<const BagTopic*>;
 
@@ -43,9 +48,17 @@ const BagTopic& named(const Bag& bag, const std::string& name, const char* optio
   return *found.front();
 }
 
-[[noreturn]] void refuse_several(const Bag& bag, const char* what, const char* option) {
-  throw InputError(bag.path(), fmt::format("has several topics of {}, expected one to be named with {}: it holds {}",
-                                           what, option, listed(bag)));
+[[noreturn]] void refuse(const Bag& bag, const std::string& found, const char* option) {
+  throw InputError(bag.path(),
+                   fmt::format("has {}, expected one to be named with {}: it holds {}", found, option, listed(bag)));
+}
+
+// Such as PSM1/jaw/measured_js beside PSM1/measured_js.
+bool is_of_part(const Bag& bag, const BagTopic& topic) {
+  if (!topic.name.ends_with(measured)) return false;
+  const std::string part = topic.name.substr(0, topic.name.size() - measured.size());
+  const std::string whole = part.substr(0, part.rfind('/')) + measured;
+  return std::ranges::any_of(bag.topics(), [&](const BagTopic& other) { return other.name == whole; });
 }
 
 }  // namespace
@@ -60,19 +73,28 @@ const BagTopic& image_topic_of(const Bag& bag, const std::string& name) {
   if (images.size() == 2)
     for (const std::size_t raw : {0u, 1u})
       if (images[raw]->name + "/compressed" == images[1 - raw]->name) return *images[raw];
-  if (images.size() > 1) refuse_several(bag, "images", option);
+  if (images.size() > 1) refuse(bag, "several topics of images", option);
   return *images.front();
 }
 
-const BagTopic* joint_topic_of(const Bag& bag, const std::string& name, const std::string& arm) {
+const BagTopic* joint_topic_of(const Bag& bag, const std::string& name, const std::string& arm,
+                               const std::vector<std::string>& others) {
   constexpr auto option = "--joint-topic";
   if (!name.empty()) return &named(bag, name, option, is_joint_state, "JointState");
-  const auto joints_ending_in = [&](const std::string& end) {
-    return those(bag, [&](const BagTopic& topic) { return is_joint_state(topic) && topic.name.ends_with(end); });
+  const Topics all = those(bag, is_joint_state);
+  const auto is_of_other = [&](const BagTopic* topic) {
+    return is_of_part(bag, *topic) || std::ranges::any_of(others, [&](const std::string& other) {
+             return topic->name.find("/" + other + "/") != std::string::npos;
+           });
   };
-  for (const std::string& end : {"/" + arm + "/measured_js", std::string("/measured_js"), std::string()})
-    if (const Topics found = joints_ending_in(end); found.size() == 1) return found.front();
-  if (!joints_ending_in("").empty()) refuse_several(bag, "joints", option);
+  Topics found;
+  for (const std::string& end : {"/" + arm + measured, measured, std::string()}) {
+    found.clear();
+    std::ranges::copy_if(all, std::back_inserter(found),
+                         [&](const BagTopic* topic) { return topic->name.ends_with(end) && !is_of_other(topic); });
+    if (found.size() == 1) return found.front();
+  }
+  if (!all.empty()) refuse(bag, found.empty() ? "no topic of joints of " + arm : "several topics of joints", option);
   return nullptr;
 }
 

@@ -25,7 +25,7 @@ std::string image_error(const std::vector<BagTopic>& topics, const std::string& 
 }
 std::string joint_topic(const std::vector<BagTopic>& topics, const std::string& name = "") {
   const ListedBag bag(topics);
-  const BagTopic* topic = joint_topic_of(bag, name, "PSM1");
+  const BagTopic* topic = joint_topic_of(bag, name, "PSM1", {"PSM3"});
   return topic ? topic->name : "none";
 }
 
@@ -33,6 +33,7 @@ const BagTopic left{"/left", image_type, 9, 1}, right{"/right", compressed_image
     left_jpeg{"/left/compressed", compressed_image_type, 9, 1}, silent{"/silent", image_type, 0, 0},
     tf{"/tf", "tf2_msgs/TFMessage", 3, 1};
 const BagTopic psm1{"/PSM1/measured_js", joint_type, 9, 1}, psm2{"/PSM2/measured_js", joint_type, 9, 1},
+    jaw{"/PSM2/jaw/measured_js", joint_type, 9, 1}, psm3{"/PSM3/measured_js", joint_type, 9, 1},
     set_points{"/PSM1/setpoint_js", joint_type, 9, 1}, ecm{"/ECM/setpoint_js", joint_type, 9, 1};
 
 TEST(BagTopics, TheOnlyImages) {
@@ -60,9 +61,13 @@ TEST(BagTopics, TheArmsMeasuredJoints) {
   EXPECT_EQ(joint_topic({psm1, psm2, set_points, left}), "/PSM1/measured_js");
   EXPECT_EQ(joint_topic({psm2, set_points}), "/PSM2/measured_js");  // the only one
   EXPECT_EQ(joint_topic({ecm, tf}), "/ECM/setpoint_js");
+  EXPECT_EQ(joint_topic({psm2, jaw}), "/PSM2/measured_js");
   EXPECT_EQ(joint_topic({left}), "none");
   EXPECT_EQ(joint_topic({psm1, psm2}, "/PSM2/measured_js"), "/PSM2/measured_js");
   EXPECT_NE(testing::input_error([] { joint_topic({set_points, ecm}); }).find("--joint-topic"), std::string::npos);
+  EXPECT_EQ(testing::input_error([] { joint_topic({psm3}); }),
+            "run.bag: has no topic of joints of PSM1, expected one to be named with --joint-topic: it holds "
+            "/PSM3/measured_js (sensor_msgs/JointState, 9)");
   const std::string no_joints = testing::input_error([] { joint_topic({psm1, left}, "/left"); });
   EXPECT_NE(no_joints.find("--joint-topic: is /left"), std::string::npos);
 }

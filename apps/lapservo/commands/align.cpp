@@ -58,7 +58,7 @@ void write_page(const std::string& path, const std::string& input, const Alignme
 int run(const CalibrateOptions& options) {
   InstrumentJob job(options);
   Instrument instrument = job.instrument();
-  const auto joints = find_joint_input(options, instrument, job.frames.get());
+  const auto joints = find_joint_input(options, job.rig, job.index, job.frames.get());
   if (!joints) throw InputError("--joints", "is missing, expected a CSV or a bag with the joints");
   instrument.joints = joints->joints;
   job.begin();

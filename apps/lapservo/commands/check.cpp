@@ -362,7 +362,7 @@ int check(const CalibrateOptions& options) {
   const Rig& rig = job.rig;
   const std::size_t index = job.index;
   Instrument instrument = job.instrument();
-  const auto joints = find_joint_input(options, instrument, job.frames.get());
+  const auto joints = find_joint_input(options, job.rig, job.index, job.frames.get());
   if (joints) instrument.joints = joints->joints;
   job.begin();
   constexpr int enough = 1800;

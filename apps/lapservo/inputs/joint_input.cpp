@@ -31,12 +31,13 @@ struct RecordedJoints {
   std::shared_ptr<const Bag> bag{};
   const BagTopic* topic = nullptr;
 
-  RecordedJoints(const RecordingOptions& options, const Instrument& instrument) : source(options.joints) {
+  RecordedJoints(const RecordingOptions& options, const std::string& arm, const std::vector<std::string>& others = {})
+      : source(options.joints) {
     const std::string path = bag_of(options.joints.empty() ? options.input : options.joints);
     if (path.empty()) return;
     bag = open_bag(path);
     if (path != options.input) say_remark(path, bag->remark());
-    topic = joint_topic_of(*bag, options.joint_topic, instrument.name);
+    topic = joint_topic_of(*bag, options.joint_topic, arm, others);
     if (topic) source = path + ": " + topic->name;
   }
   std::vector<std::string> names() const {
@@ -87,13 +88,17 @@ bool share_a_joint(const std::optional<Tool>& a, const std::optional<Tool>& b) {
   });
 }
 
+bool is_of_other_arm(const std::string& topic, const std::string& arm) {
+  return topic.ends_with("/measured_js") && !topic.ends_with("/" + arm + "/measured_js");
+}
+
 }  // namespace
 
 WristInput find_wrist_input(const RecordingOptions& options, const Rig& rig, std::size_t index,
                             const FrameSource& frames, bool counts) {
   const Instrument& instrument = rig.instruments[index];
   if (!instrument.tool || instrument.tool->wrist.empty()) return {};
-  const RecordedJoints recorded(options, instrument);
+  const RecordedJoints recorded(options, instrument.name);
   const auto found = wrist_joints(*instrument.tool, recorded.names());
   if (!found)
     return {std::nullopt, fmt::format("no readings of the wrist's joints {}: --joints names a recording or topic that "
@@ -175,13 +180,19 @@ void refuse_idle_joint_topic(const RecordingOptions& options) {
   if (bag_of(source).empty()) refuse_topic_outside_bags("--joint-topic", options.joint_topic, source);
 }
 
-std::optional<JointInput> find_joint_input(const RecordingOptions& options, const Instrument& instrument,
+std::optional<JointInput> find_joint_input(const RecordingOptions& options, const Rig& rig, std::size_t index,
                                            const FrameSource* frames) {
   refuse_idle_joint_topic(options);
-  const RecordedJoints recorded(options, instrument);
+  const Instrument& instrument = rig.instruments[index];
+  std::vector<std::string> others;
+  for (const Instrument& other : rig.instruments)
+    if (&other != &instrument) others.push_back(other.name);
+  const RecordedJoints recorded(options, instrument.name, others);
   if (recorded.source.empty()) return std::nullopt;
   if (recorded.bag && !recorded.topic)
     throw InputError(options.joints, std::string("has no messages of ") + joint_type + ", expected the joints'");
+  if (recorded.topic && options.joint_topic.empty() && is_of_other_arm(recorded.topic->name, instrument.name))
+    say_remark(recorded.source, "its joints count as those of " + instrument.name + ": --joint-topic names others");
   const bool are_known = !recorded.topic && instrument.joints;  // a pipe is read once
   const Joints joints =
       joints_of(instrument, are_known ? std::vector<std::string>() : recorded.names(), recorded.source, options.rig);

@@ -24,8 +24,9 @@ void refuse_idle_joint_topic(const RecordingOptions& options);
 /// Joints of --joints, a CSV or a bag; without --joints of the input itself where it is a bag that has them, else
 /// nullopt. Reads the instrument's joints; where it has none, the recording's own four in the order theta, phi, rho,
 /// psi. A bag's stamps go with those of `frames`; where these have none, or there is nullptr, its times begin with its
-/// joints. Throws InputError for other files, and as refuse_idle_joint_topic().
-std::optional<internal::JointInput> find_joint_input(const RecordingOptions& options, const Instrument& instrument,
+/// joints. Says on stderr where they are those of an arm of another name. Throws InputError for other files, and as
+/// refuse_idle_joint_topic().
+std::optional<internal::JointInput> find_joint_input(const RecordingOptions& options, const Rig& rig, std::size_t index,
                                                      const FrameSource* frames);
 
 /// The readings of the joints of a tool's wrist during the frames.

@@ -43,7 +43,7 @@ int calibrate_marker(const CalibrateOptions& options) {
   std::optional<JointInput> joints;
   if (!options.joints.empty()) {
     expect_registration(instrument, options.rig, "--joints");
-    joints = find_joint_input(options, instrument, job.frames.get());
+    joints = find_joint_input(options, job.rig, job.index, job.frames.get());
     joints.value().source = options.joints;
   }
   job.begin();

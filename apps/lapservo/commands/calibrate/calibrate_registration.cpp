@@ -184,7 +184,7 @@ void print_reach(const Marker& marker, const Registration& registration) {
 int calibrate_registration(const CalibrateOptions& options) {
   InstrumentJob job(options, !is_table(options.input));
   Instrument instrument = job.instrument();
-  const auto joints = find_joint_input(options, instrument, job.frames.get());
+  const auto joints = find_joint_input(options, job.rig, job.index, job.frames.get());
   if (joints) instrument.joints = joints->joints;
   job.begin();
   DvrkOutput dvrk(options.dvrk, joints.has_value());
