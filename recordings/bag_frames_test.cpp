@@ -137,7 +137,7 @@ TEST(BagJoints, ThatCanNotBeUsedAreRefused) {
       {{{since_1970_s, names, {1, 2, 3, 0.4}}, {since_1970_s + 1, names, {1, 2, 3, 0.4}}},
        "the images are stamped by the time since a computer's start"},
       {{{100, {"a", "b", "c"}, {1, 2, 3}}},
-       "/PSM1/measured_js: has no positions of the rig's joints b, a, d, c: it names a, b, c"},
+       "/PSM1/measured_js: has no positions of the rig's joints: it has the joints a, b, c, expected b, a, d, c"},
       {{{100, names, {1, 2, 3, 0.4}}, {101, {"a", "b", "c", "d", "b"}, {1, 2, 3, 0.4, 5}}},
        "/PSM1/measured_js: names the joint b twice in a message, expected each name once"},
       {{{100, names, {1, 2, 3}}}, "has no positions of the rig's joints"},

@@ -7,7 +7,6 @@
 #include <variant>
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include "lapservo/control/wild_joints.h"
 #include "lapservo/core/error.h"
@@ -117,14 +116,13 @@ JointRecording joints_in_bag(const Bag& bag, const BagTopic& topic, const Joints
   recording.left_out = messages.left_out() - messages.repeated();
   recording.steps = messages.steps(), recording.steps_by_gap = messages.steps_by_gap();
   if (recording.time_s.empty() && recording.of_other_arms > 0)
-    throw InputError(source, fmt::format("has no positions of the rig's joints {}: it names {}",
-                                         fmt::join(joints.names, ", "), fmt::join(other_names, ", ")));
+    throw InputError(source, "has no positions of the rig's joints: it " + unfit_joints(joints, other_names));
   if (recording.time_s.size() < 2)
     throw InputError(source, fmt::format("has {} readings that are numbers with a stamp, expected two or more",
                                          recording.time_s.size()));
   if (begin_s) check_clock(recording, *begin_s, source);
-  expect_one_arm(recording, whose, source);
   check_units(recording, joints, source, whose);
+  expect_one_arm(recording, whose, source);
   return recording;
 }
 

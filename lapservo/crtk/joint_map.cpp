@@ -38,9 +38,11 @@ std::optional<std::array<std::size_t, 4>> find_names(const Names& wanted, const 
 }
 
 // A PSM without an instrument: the discs of the sterile adapter are joints, by the names of the instrument's or not.
-bool has_no_tool(const std::vector<std::string>& names) {
-  return std::any_of(names.begin(), names.end(),
-                     [](const std::string& name) { return name.rfind("disc", 0) == 0 || name == "jaw"; });
+// The first that says so; empty where none does.
+std::string joint_of_no_tool(const std::vector<std::string>& names) {
+  const auto found = std::find_if(names.begin(), names.end(),
+                                  [](const std::string& name) { return name.rfind("disc", 0) == 0 || name == "jaw"; });
+  return found == names.end() ? "" : *found;
 }
 
 }  // namespace
@@ -55,7 +57,7 @@ JointLimits limits_of_q(const Joints& joints, const JointLimits& limits) {
 
 std::optional<std::array<std::size_t, 4>> find_joints(const Joints& joints, const std::vector<std::string>& names) {
   const auto other = other_names(joints);
-  if (other && has_no_tool(names)) return std::nullopt;
+  if (other && !joint_of_no_tool(names).empty()) return std::nullopt;
   if (const auto places = find_names(joints.names, names)) return places;
   return other ? find_names(*other, names) : std::nullopt;
 }
@@ -90,9 +92,14 @@ std::string unfit_joints(const Joints& joints, const std::vector<std::string>& n
                        printable(twice));
   if (names.empty()) return "names no joints: enable and home the arm";
   const auto other = other_names(joints);
+  const std::string no_tool = other ? joint_of_no_tool(names) : "";
   return fmt::format("has the joints {}, expected {}{}{}", printable_names(names), fmt::join(joints.names, ", "),
                      other ? fmt::format(" or {}", fmt::join(*other, ", ")) : "",
-                     has_no_tool(names) ? ". The arm knows no instrument: name it on set_tool_type" : "");
+                     no_tool.empty()
+                         ? ""
+                         : fmt::format(" without {}. A dVRK's arm has it while it knows no instrument: name that on "
+                                       "set_tool_type; another arm publishes its jaw on jaw/measured_js",
+                                       printable(no_tool)));
 }
 
 }  // namespace lapservo::internal

@@ -104,9 +104,9 @@ Joints joints_of(const Instrument& instrument, const std::vector<std::string>& r
   if (instrument.joints) return *instrument.joints;
   Joints joints;
   if (recorded.size() != joints.names.size())
-    throw InputError(source, "columns", fmt::format("{}", fmt::join(recorded, ", ")),
-                     "time_s and four joints (theta's, phi's, rho's, psi's), since " + instrument.name +
-                         " has no joints entry in " + rig + " that would name them");
+    throw InputError(source, "joints", fmt::format("{}", fmt::join(recorded, ", ")),
+                     "four (theta's, phi's, rho's, psi's), since " + instrument.name + " has no joints entry in " +
+                         rig + " that would name them among others");
   std::copy(recorded.begin(), recorded.end(), joints.names.begin());
   return joints;
 }
