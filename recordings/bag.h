@@ -21,7 +21,7 @@ struct BagTopic {
 };
 
 /// std::monostate: bytes that are no message of the topic's type, or of one that is not read here.
-using BagMessage = std::variant<std::monostate, JointMessage, ImageMessage, CompressedImageMessage>;
+using BagMessage = std::variant<std::monostate, JointMessage, ImageMessage, CompressedImageMessage, PlaceMessage>;
 
 /// A topic's messages as they were recorded, one after the other.
 class BagMessages {
@@ -55,6 +55,7 @@ class Bag {
 inline constexpr const char* joint_type = "sensor_msgs/JointState";
 inline constexpr const char* image_type = "sensor_msgs/Image";
 inline constexpr const char* compressed_image_type = "sensor_msgs/CompressedImage";
+inline constexpr const char* place_type = "geometry_msgs/PoseStamped";
 
 /// The type of topics that carry such messages.
 template <typename Message>
@@ -68,6 +69,7 @@ BagMessage decode_bag_message(const std::string& type, const Decode& decode, con
   const auto message = [](auto decoded) { return decoded ? BagMessage(std::move(*decoded)) : BagMessage(); };
   if (type == joint_type) return message(decode.template operator()<JointMessage>(bytes));
   if (type == image_type) return message(decode.template operator()<ImageMessage>(bytes));
+  if (type == place_type) return message(decode.template operator()<PlaceMessage>(bytes));
   if (type == compressed_image_type) return message(decode.template operator()<CompressedImageMessage>(bytes));
   return {};
 }

@@ -1,5 +1,6 @@
 #include "recordings/bag_frames.h"
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <string>
@@ -10,6 +11,7 @@
 
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
+#include "recordings/bag_endoscope.h"
 #include "recordings/bag_joints.h"
 #include "recordings/bag_topics.h"
 #include "recordings/open_bag.h"
@@ -94,6 +96,24 @@ class BagOfJoints {
   testing::TemporaryFolder folder_;
   std::shared_ptr<const Bag> bag_;
 };
+
+// By noise it does not.
+TEST(BagEndoscope, SaysByHowMuchAndWhenItMoved) {
+  const testing::TemporaryFolder folder;
+  const auto text_of = [&](double way_m) {
+    std::vector<BagEntry> entries;
+    for (int i = 0; i < 300; ++i) {
+      PlaceMessage place{100 + 0.01 * i, "Cart", {}};
+      const double x_m = way_m * std::clamp(0.01 * i - 1, 0.0, 1.0) + 2e-5 * std::sin(9.0 * i);
+      place.pose = {Eigen::Quaterniond(Eigen::AngleAxisd(5 * x_m, Eigen::Vector3d::UnitY())), {x_m, 0, 0}};
+      entries.push_back({"/ECM/measured_cp", place_type, place.stamp_s, testing::ros1_bytes(place)});
+    }
+    testing::write_ros1_bag(folder / "run.bag", entries);
+    return endoscope_motion_text(*open_bag(folder / "run.bag"));
+  };
+  EXPECT_EQ(text_of(0), "");
+  EXPECT_EQ(text_of(3e-3), "the endoscope moved by 3.0 mm and 15.1 mrad between 1.1 and 1.9 s");
+}
 
 // Those of another arm on the same topic are passed over.
 TEST(BagJoints, AreThoseOfTheRigInItsOrder) {

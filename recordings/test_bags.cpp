@@ -51,6 +51,7 @@ std::vector<std::uint8_t> ros1_bytes(const Message& message) {
 template std::vector<std::uint8_t> ros1_bytes(const JointMessage&);
 template std::vector<std::uint8_t> ros1_bytes(const ImageMessage&);
 template std::vector<std::uint8_t> ros1_bytes(const CompressedImageMessage&);
+template std::vector<std::uint8_t> ros1_bytes(const PlaceMessage&);
 
 std::vector<std::uint8_t> cdr_bytes(const JointMessage& message, bool big_endian) {
   const std::vector<double> velocities(message.positions.size(), 0.5), no_efforts;

@@ -10,6 +10,7 @@ namespace lapservo::internal {
 struct JointMessage;
 struct ImageMessage;
 struct CompressedImageMessage;
+struct PlaceMessage;
 }  // namespace lapservo::internal
 
 namespace lapservo::testing {

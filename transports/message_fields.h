@@ -128,6 +128,11 @@ void in_order(auto& each, Is<JointMessage> auto& message) {
   each.template unused<double>();  // effort
 }
 
+void in_order(auto& each, Is<PlaceMessage> auto& message) {
+  for (auto& value : message.pose.translation) each(value);
+  for (auto& value : message.pose.rotation.coeffs()) each(value);  // x, y, z, w
+}
+
 void in_order(auto& each, Is<ImageMessage> auto& message) {
   each(message.height);
   each(message.width);

@@ -29,11 +29,6 @@ void in_order(MessageBytes& from, OperatingStateMessage& message) {
   from(message.is_busy);
 }
 
-void in_order(MessageBytes& from, PlaceMessage& message) {
-  for (double& value : message.pose.translation) from(value);
-  for (double& value : message.pose.rotation.coeffs()) from(value);  // x, y, z, w
-}
-
 void in_order(MessageBytes& from, StringMessage& message) {
   from(message.text);
 }

@@ -81,6 +81,7 @@ std::optional<Message> decode_cdr(std::span<const std::uint8_t> bytes) {
 template std::optional<JointMessage> decode_cdr(std::span<const std::uint8_t>);
 template std::optional<ImageMessage> decode_cdr(std::span<const std::uint8_t>);
 template std::optional<CompressedImageMessage> decode_cdr(std::span<const std::uint8_t>);
+template std::optional<PlaceMessage> decode_cdr(std::span<const std::uint8_t>);
 
 template <typename Message>
 std::vector<std::uint8_t> encode_cdr(const Message& message) {

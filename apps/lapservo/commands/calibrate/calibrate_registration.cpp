@@ -23,6 +23,8 @@
 #include "lapservo/crtk/dvrk_frames.h"
 #include "lapservo/rig/joint_travel.h"
 #include "lapservo/robot/steady_clock.h"
+#include "recordings/bag_endoscope.h"
+#include "recordings/open_bag.h"
 
 namespace lapservo::app {
 using namespace internal;
@@ -138,6 +140,15 @@ class DvrkOutput {
   Transport::Publisher<PlaceMessage> say_;
 };
 
+// Why the endoscope did not stand as in one registration; empty where no bag says so.
+std::string moved_endoscope(const CalibrateOptions& options) {
+  for (const std::string& recording : {options.input, options.joints})
+    if (const std::string bag = bag_of(recording); !bag.empty())
+      if (const std::string moved = endoscope_motion_text(*open_bag(bag)); !moved.empty())
+        return fmt::format("{} of {}: record with the endoscope at rest, or cut the bag to where it rests", moved, bag);
+  return "";
+}
+
 void print_numbers(const Instrument& before, const Registration& registration) {
   std::printf("\n                               before        after      sigma\n");
   for (const CalibratedNumber& n : registered_numbers(before, registration))
@@ -187,6 +198,7 @@ int calibrate_registration(const CalibrateOptions& options) {
   const auto joints = find_joint_input(options, job.rig, job.index, job.frames.get());
   if (joints) instrument.joints = joints->joints;
   job.begin();
+  if (const std::string moved = moved_endoscope(options); !moved.empty()) return job.refuse(moved);
   DvrkOutput dvrk(options.dvrk, joints.has_value());
   const MeasuredPoses poses = job.frames ? poses_in_frames(job.rig, job.index, job.recording(), watched_job())
                                          : poses_in_table(options.input, instrument.name);
