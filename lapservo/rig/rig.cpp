@@ -379,7 +379,6 @@ Tool parse_wrist(const YamlField& field) {
     const std::string name = tool.wrist.back().name;
     if (std::ranges::count(tool.wrist, name, &WristJoint::name) > 1) joint["name"].fail(name, expected);
   }
-  tool.last_from_tip.translation = point_in(field["tip_in_last_joint_m"]);
   if (const YamlField turn = field["tip_quaternion_xyzw"]; turn.present())
     tool.last_from_tip.rotation = parse_unit_quaternion(turn);
   if (const YamlField snake = field["snake_like"]; snake.present()) tool.snake_like = snake.boolean();
@@ -431,12 +430,14 @@ void parse_readings(const YamlField& field, Tool& tool) {
 Tool parse_wristed(const YamlField& field, const fs::path& folder) {
   constexpr auto key = "wrist_in_marker_m";
   const bool has_file = field["file"].present();
-  KnownKeys known{{"file", "covariance", "sigma_reading_rad"}, {key, "azimuth_rad", "offset_rad"}};
-  if (!has_file)
-    known.words.insert(known.words.end(), {"joints", "tip_in_last_joint_m", "tip_quaternion_xyzw", "snake_like"});
+  KnownKeys known{{"file", "tip_in_last_joint_m", "covariance", "sigma_reading_rad"},
+                  {key, "azimuth_rad", "offset_rad"}};
+  if (!has_file) known.words.insert(known.words.end(), {"joints", "tip_quaternion_xyzw", "snake_like"});
   expect_keys(field, known);
   Tool tool =
       has_file ? read_dvrk_tool(folder / field["file"].text("the path of a dVRK tool file")) : parse_wrist(field);
+  if (const YamlField tip = field["tip_in_last_joint_m"]; !has_file || tip.present())
+    tool.last_from_tip.translation = point_in(tip);
   parse_readings(field, tool);
   const bool placed = field[key].present();
   for (const char* other : {"azimuth_rad", "sigma_offset_rad", "covariance"})

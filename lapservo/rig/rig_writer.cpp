@@ -168,10 +168,10 @@ std::string wrist_joints_yaml(const Tool& tool, int indent) {
 }
 
 void add_wrist(Lines& lines, const Tool& tool, const fs::path& destination) {
+  lines.add("tip_in_last_joint_m", text_of(tool.last_from_tip.translation));
   if (!tool.file.empty() && !destination.empty()) return lines.add("file", path_yaml(tool.file, destination));
   const Eigen::Quaterniond& q = tool.last_from_tip.rotation;
   lines.add_map("joints", wrist_joints_yaml(tool, 8));
-  lines.add("tip_in_last_joint_m", text_of(tool.last_from_tip.translation));
   lines.add("tip_quaternion_xyzw", text_of(std::array{q.x(), q.y(), q.z(), q.w()}));
   if (tool.snake_like) lines.add("snake_like", "true");
 }

@@ -64,13 +64,16 @@ TEST(ToolField, DvrksFileIsFoundFromTheRig) {
   const Tool placed = parsed("{file: invented.json, wrist_in_marker_m: [0, 0, 0.05], azimuth_rad: 0.5}", folder.path());
   EXPECT_EQ(placed.last_from_tip, alone.last_from_tip);
   EXPECT_EQ(placed.place.value().azimuth_rad, 0.5);
+  const Tool longer = parsed("{file: invented.json, tip_in_last_joint_m: [0, 0.02, 0]}", folder.path());
+  EXPECT_EQ(longer.last_from_tip, (Rigid3{alone.last_from_tip.rotation, {0, 0.02, 0}}));
 }
 
 TEST(ToolField, IsWrittenAsItIsRead) {
   const testing::TemporaryFolder folder;
   testing::write_file(folder / "invented.json", invented_tool_json);
   const std::string straight = "{tip_in_marker_m: [0, 0.1, 0.2], covariance: {data: [3, 1, 0, 1, 2, 0, 0, 0, 1e-17]}}";
-  for (const std::string& text : {straight, std::string("invented.json")}) {
+  const std::string longer = "{file: invented.json, tip_in_last_joint_m: [0, 0.02, 0]}";
+  for (const std::string& text : {straight, std::string("invented.json"), longer}) {
     Rig rig = parse_rig(before_tool + text + "\n", "rig.yaml", folder.path());
     EXPECT_EQ(parse_rig(rig_yaml(rig, folder / "other.yaml"), "other.yaml", folder.path()), rig) << text;
     const Tool given = placed_tool();

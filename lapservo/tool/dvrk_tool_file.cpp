@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <Eigen/Geometry>
+#include <fmt/format.h>
 
 #include "lapservo/core/yaml_field.h"
 
@@ -120,6 +121,17 @@ Tool read_dvrk_tool(const std::filesystem::path& path) {
   Tool tool = parse_dvrk_tool(read_yaml(path), path.string());
   tool.file = path;
   return tool;
+}
+
+std::string axis_tip_text(const Tool& tool) {
+  constexpr double least_m = 1e-3, jaw_m = 0.01;
+  const auto& [rotation, tip_m] = tool.last_from_tip;
+  if (tool.file.empty() || tool.wrist.empty() || tip_m.head<2>().norm() > least_m) return "";
+  const Eigen::Vector3d end_m = (1e4 * (tip_m + jaw_m * (rotation * Eigen::Vector3d::UnitZ()))).array().round() / 1e4;
+  return fmt::format(
+      "the tip is the point on the axis of {}, where {} ends, and not the end of the jaw: for one that is 10 mm "
+      "longer, the rig's tool needs tip_in_last_joint_m: [{:g}, {:g}, {:g}]",
+      tool.wrist.back().name, tool.file.filename().string(), end_m.x() + 0.0, end_m.y() + 0.0, end_m.z() + 0.0);
 }
 
 }  // namespace lapservo::internal

@@ -17,4 +17,8 @@ Tool read_dvrk_tool(const std::filesystem::path& path);
 /// The same from text; `source` stands for the file's name in errors.
 Tool parse_dvrk_tool(std::string_view json, const std::string& source);
 
+/// That the tip of a tool with such a file is a point on the axis of its last joint, where most of them end, and not
+/// the end of its jaw, with the key of a rig that moves it; empty for other tools.
+std::string axis_tip_text(const Tool& tool);
+
 }  // namespace lapservo::internal

@@ -13,12 +13,14 @@
 
 #include "lapservo/core/random.h"
 #include "lapservo/core/yaml_field.h"
+#include "lapservo/testing/has.h"
 #include "lapservo/testing/input_error.h"
 #include "lapservo/tool/test_tools.h"
 
 namespace lapservo::internal {
 namespace {
 namespace fs = std::filesystem;
+using testing::has;
 using testing::input_error;
 
 // A row of the file and its link by cisstRobot's robModifiedDH, to which the joint's offset and value are added.
@@ -60,6 +62,13 @@ void expect_agreement(const Chain& chain, const Tool& tool, Random& random) {
   }
 }
 
+std::string changed(const std::string& old_text, const std::string& new_text) {
+  std::string json(invented_tool_json);
+  const std::size_t at = json.find(old_text);
+  EXPECT_NE(at, std::string::npos) << old_text;
+  return json.replace(at, old_text.size(), new_text);
+}
+
 TEST(DvrkToolFile, HasThePoseThatDvrkComputes) {
   constexpr double right = std::numbers::pi / 2;
   Chain chain{{{-right, 0, 0, 0, -1.5708}, {-right, 0.0085, 0.1, 0.001, -1.5}}, {}};
@@ -69,21 +78,20 @@ TEST(DvrkToolFile, HasThePoseThatDvrkComputes) {
   EXPECT_EQ(tool.wrist[1].sigma_reading_rad, std::numbers::pi / 180);
   EXPECT_FALSE(tool.snake_like);
   EXPECT_FALSE(tool.place);
+  EXPECT_EQ(parse_dvrk_tool(changed("tooltip_offset", "tooltip-offset"), "before_2_4.json"), tool);
   Random random(1);
   expect_agreement(chain, placed_at_the_marker(tool), random);
 }
 
-std::string changed(const std::string& old_text, const std::string& new_text) {
-  std::string json(invented_tool_json);
-  const std::size_t at = json.find(old_text);
-  EXPECT_NE(at, std::string::npos) << old_text;
-  return json.replace(at, old_text.size(), new_text);
-}
-
-TEST(DvrkToolFile, HasTheTipAlsoByTheKeyOfEarlierReleases) {
-  const Tool since_2_4 = parse_dvrk_tool(invented_tool_json, "tool.json");
-  EXPECT_GT(since_2_4.last_from_tip.translation.norm(), 0);
-  EXPECT_EQ(parse_dvrk_tool(changed("tooltip_offset", "tooltip-offset"), "tool.json"), since_2_4);
+TEST(DvrkToolFile, ThatEndsOnAnAxisNamesTheKeyThatMovesItsTip) {
+  Tool tool = parse_dvrk_tool(changed("0.010]", "0.000]"), "tool.json");
+  EXPECT_EQ(axis_tip_text(tool), "");  // the tip of a rig's own `joints` is where the rig says
+  tool.file = "folder/tool.json";
+  const std::string text = axis_tip_text(tool);
+  EXPECT_TRUE(has(text, "on the axis of wrist_yaw, where tool.json ends")) << text;
+  EXPECT_TRUE(has(text, "tip_in_last_joint_m: [0, 0.01, 0]")) << text;
+  tool.last_from_tip.translation.y() = 0.01;
+  EXPECT_EQ(axis_tip_text(tool), "");
 }
 
 TEST(DvrkToolFile, RefusesOthersAndNamesTheField) {
