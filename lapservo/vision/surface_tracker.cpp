@@ -58,7 +58,8 @@ Scene SurfaceTracker::scene_of(const ImageView& image, const Tracked& it) const 
 
 // Also what was refused: a marker that moves looks like another one before its motion is known.
 std::optional<PoseBefore> SurfaceTracker::pose_before(const Tracked& it) const {
-  if (it.memory) return it.memory->pose_before(now_s_);
+  if (const auto& known = it.memory)
+    return PoseBefore{known->fit.unknowns, known->time_s - now_s_, known->step, known->step_s};
   const std::optional<ShaftPose>& seen = it.seen_before[0];
   if (!seen) return std::nullopt;
   return PoseBefore{{*seen, false}, before_s_ - now_s_ + exposed_after_s(rig_.camera, it.instrument.marker, *seen)};

@@ -16,12 +16,6 @@ Expected InstrumentMemory::expected(double at_s) const {
   return expected;
 }
 
-PoseBefore InstrumentMemory::pose_before(double frame_s) const {
-  PoseBefore before{fit.unknowns, time_s - frame_s};
-  if (step_s > 0) before.per_s = step / step_s, before.step_s = step_s;
-  return before;
-}
-
 InstrumentMemory remembered(const std::optional<InstrumentMemory>& before, const FineFit& fit, bool among_others,
                             double time_s) {
   InstrumentMemory memory{time_s, fit, before ? before->looks : LookSchedule{}, among_others};

@@ -68,8 +68,6 @@ struct InstrumentMemory {
   Expected expected(double at_s) const;
   /// Where it is when it moves on as it did, for some steps at most.
   PoseUnknowns expected_pose(double at_s) const;
-  /// As a frame of this time sees it.
-  PoseBefore pose_before(double frame_s) const;
 };
 
 /// After a frame in which it was found.

@@ -1,10 +1,9 @@
 #include "lapservo/vision/shaft/rolling_shutter.h"
 
+#include "lapservo/core/angles.h"
+
 namespace lapservo::internal {
 namespace {
-
-// How uncertain a rate is beside its even change, a fraction: of hands, which move at 1 Hz, at 30 frames a second.
-constexpr double uneven = 0.02;
 
 double middle_row_px(const Camera& camera, const Marker& marker, const ShaftPose& pose) {
   return camera.raw_from_point(point_on_axis(pose, marker.length_m() / 2)).y();
@@ -22,9 +21,10 @@ RowMotion::RowMotion(const Camera& camera, const Marker& marker, const PoseUnkno
   if (!(passed_s > 0)) return;
   PoseVector per_s = before.unknowns.change_to(now) / passed_s;  // in the middle of that time
   if (before.step_s > 0) {
-    const PoseVector since = passed_s / (passed_s + before.step_s) * (per_s - before.per_s);
+    const PoseVector since = passed_s / (passed_s + before.step_s) * (per_s - before.step / before.step_s);
     per_s += since;
-    to_frame_sigma_ = exposed_s * (since.cwiseAbs() + uneven * per_s.cwiseAbs());
+    const double turned_rad = two_pi * passed_s;  // of a motion at 1 Hz, as hands have it: its rate changes unevenly
+    to_frame_sigma_ = exposed_s * (since.cwiseAbs() + turned_rad * turned_rad / 2 * per_s.cwiseAbs());
   }
   by_row_ = camera.readout_s / camera.height_px * per_s;
   to_frame_ = -exposed_s * per_s;

@@ -13,12 +13,12 @@ namespace lapservo::internal {
 /// When the middle of the marker is exposed, after the frame's time.
 double exposed_after_s(const Camera& camera, const Marker& marker, const ShaftPose& pose);
 
-/// Where the marker was when it was exposed in the frame before, and its mean rate on the way there.
+/// Where the marker was when it was exposed in the frame before, and how it came there.
 struct PoseBefore {
   PoseUnknowns unknowns;
-  double time_s;                          ///< of that exposure, after the frame's time that it is compared with
-  PoseVector per_s = PoseVector::Zero();  ///< over the step that led there
-  double step_s = 0;                      ///< which took so long; 0 where nothing was seen before
+  double time_s;                         ///< of that exposure, after the frame's time that it is compared with
+  PoseVector step = PoseVector::Zero();  ///< of the unknowns, that led there
+  double step_s = 0;                     ///< which took so long; 0 where nothing was seen before
 };
 
 /// How a rolling shutter shows a marker that moves: a row that is exposed later shows it farther on. A pose is that of
