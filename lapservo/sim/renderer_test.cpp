@@ -1,7 +1,6 @@
 #include "lapservo/sim/renderer.h"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 #include <vector>
 

@@ -11,7 +11,6 @@
 #include "lapservo/sim/tissue.h"
 #include "lapservo/testing/has.h"
 #include "lapservo/testing/scenes.h"
-#include "lapservo/vision/colour/colour_classes.h"
 
 namespace lapservo::internal {
 namespace {
