@@ -23,6 +23,11 @@ inline bool is_mcap(const std::string& path) {
   return begins_like(path, "\x89MCAP") || ends_like(path, {".mcap"});
 }
 
+/// Whether a file is named like a ROS 1 bag, or one that is not finished.
+inline bool ends_like_ros1_bag(std::string_view name) {
+  return ends_like(name, {".bag", ".bag.active"});
+}
+
 /// Whether a file is named like one of a ROS 2 bag, of any storage.
 inline bool ends_like_ros2_bag(std::string_view name) {
   return ends_like(name, {".db3", ".mcap", ".db3.zstd", ".mcap.zstd"});

@@ -164,24 +164,4 @@ TEST(McapFile, ChecksTheSumsThatItHas) {
   }
 }
 
-TEST(McapFile, SeveralOfAFolderAreOneBag) {
-  const testing::TemporaryFolder folder;
-  const auto messages = entries(9);
-  testing::write_mcap(folder / "bag_9.mcap", {messages.begin(), messages.begin() + 4});
-  testing::write_mcap(folder / "bag_10.mcap", {messages.begin() + 4, messages.end()}, {"zstd", 3, true, true});
-  testing::write_file(folder / "bag_11.mcap", "");
-  ASSERT_TRUE(is_bag(folder.path()));
-  const auto bag = open_bag(folder.path());
-  std::size_t count = 0;
-  for (const BagTopic& topic : bag->topics()) {
-    count += topic.messages;
-    double last_s = 0;
-    for (const auto from = bag->messages(topic); from->next(); last_s = from->recorded_s())
-      EXPECT_GT(from->recorded_s(), last_s);
-  }
-  EXPECT_EQ(count, 9u);
-  testing::write_ros2_bag(folder / "bag_12.db3", messages);
-  EXPECT_NE(input_error([&] { open_bag(folder.path()); }).find("files of several kinds"), std::string::npos);
-}
-
 }  // namespace lapservo::internal::mcap_file_test

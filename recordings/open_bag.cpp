@@ -4,6 +4,7 @@
 #include <system_error>
 
 #include "lapservo/core/error.h"
+#include "lapservo/io/image_file.h"
 #include "recordings/bag_endings.h"
 #ifdef LAPSERVO_BAGS
 #include "recordings/session.h"
@@ -19,16 +20,21 @@ BagKind kind_of_file(const std::string& path) {
   if (begins_like(path, "#ROSBAG ")) return BagKind::ros1;
   if (begins_like(path, "SQLite format 3") || is_mcap(path)) return BagKind::ros2;
   if (ends_like(path, {".db3.zstd", ".mcap.zstd", ".bag.zst", ".db3.zst", ".mcap.zst"})) return BagKind::compressed;
-  if (ends_like(path, {".bag", ".bag.active"})) return BagKind::ros1;
+  if (ends_like_ros1_bag(path)) return BagKind::ros1;
   return ends_like(path, {".db3"}) ? BagKind::ros2 : BagKind::none;
 }
 
-// Recognises a bag by its content, so that images may have a metadata.yaml of their own.
+// Recognises a bag by its content, so that images may have a metadata.yaml, or a ROS 1 bag with their joints, beside
+// them.
 BagKind kind_of_folder(const std::string& path) {
+  bool has_ros1 = false, has_images = false;
   std::error_code error;
-  for (fs::directory_iterator entry(path, error), end; !error && entry != end; entry.increment(error))
+  for (fs::directory_iterator entry(path, error), end; !error && entry != end; entry.increment(error)) {
     if (ends_like_ros2_bag(entry->path().string())) return BagKind::ros2;
-  return BagKind::none;
+    has_ros1 |= ends_like_ros1_bag(entry->path().string());
+    has_images |= has_image_extension(entry->path());
+  }
+  return has_ros1 && !has_images ? BagKind::ros1 : BagKind::none;
 }
 
 BagKind kind_of(const std::string& path) {
@@ -59,7 +65,8 @@ std::string bag_of(const std::string& input) {
 std::shared_ptr<const Bag> open_bag(const std::string& path) {
   const BagKind kind = kind_of(path);
   if (kind == BagKind::none)
-    throw InputError(path, "is no bag, expected a ROS 1 bag, a ROS 2 bag's folder, a .db3 or an .mcap");
+    throw InputError(
+        path, "is no bag, expected a ROS 1 bag or a folder of its parts, a ROS 2 bag's folder, a .db3 or an .mcap");
   if (kind == BagKind::compressed)
     throw InputError(path, "is compressed, expected a .db3 or .mcap: unpack it with `zstd -d`");
 #ifdef LAPSERVO_BAGS

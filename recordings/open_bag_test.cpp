@@ -81,6 +81,18 @@ TEST(OpenBag, ReadsWhatRosbagWrites) {
     ASSERT_TRUE(is_bag(path));
     expect_entries(*open_bag(path));
   }
+  // Split, and named so that the alphabet's order is not theirs.
+  const auto messages = entries(as_ros1);
+  const std::filesystem::path split = folder / "split";
+  std::filesystem::create_directory(split);
+  testing::write_ros1_bag(split / "run_9.bag", {messages.begin(), messages.begin() + 3});
+  testing::write_ros1_bag(split / "run_10.bag", {messages.begin() + 3, messages.end()});
+  ASSERT_TRUE(is_bag(split));
+  EXPECT_EQ(open_bag(split)->remark(), "its 2 bags are read as one, in the order of their times");
+  EXPECT_EQ(all<JointMessage>(*open_bag(split), "/PSM1/measured_js").at(3).stamp_s, joints_at(3).stamp_s);
+  EXPECT_EQ(all<ImageMessage>(*open_bag(split), "/image").at(1).data, image_at(1).data);
+  testing::write_file(split / "0000.png", "\x89PNG");
+  EXPECT_FALSE(is_bag(split));
 }
 
 TEST(OpenBag, ReadsRos2sFilesAndFolders) {
@@ -97,12 +109,15 @@ TEST(OpenBag, ReadsRos2sFilesAndFolders) {
   std::filesystem::create_directory(split);
   testing::write_ros2_bag(split / "bag_9.db3", {messages.begin(), messages.begin() + 3});
   testing::write_ros2_bag(split / "bag_10.db3", {messages.begin() + 3, messages.end()});
+  testing::write_file(split / "bag_11.db3", "");  // just begun
   expect_entries(*open_bag(split));
   EXPECT_EQ(open_bag(split)->remark(), "has no metadata.yaml: the times of its files decide their order");
   testing::write_ros2_metadata(split, {"bag_9.db3", "split/bag_10.db3"});
   ASSERT_TRUE(is_bag(split));
   expect_entries(*open_bag(split));
-  EXPECT_EQ(open_bag(split)->remark(), "");
+  std::filesystem::remove(split / "metadata.yaml");
+  testing::write_mcap(split / "bag_12.mcap", messages);
+  EXPECT_NE(input_error([&] { open_bag(split); }).find("files of several kinds"), std::string::npos);
 }
 
 TEST(OpenBag, SaysWhichFilesOfAFolderItsMetadataDoesNotList) {

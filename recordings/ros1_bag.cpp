@@ -1,11 +1,16 @@
 #include <algorithm>
 #include <cstring>
+#include <deque>
+#include <filesystem>
+#include <limits>
 #include <map>
+#include <system_error>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "lapservo/core/error.h"
+#include "recordings/bag_endings.h"
 #include "recordings/chunk_compression.h"
 #include "recordings/file_bytes.h"
 #include "recordings/open_bag.h"
@@ -14,6 +19,7 @@
 namespace lapservo::internal {
 namespace {
 
+namespace fs = std::filesystem;
 using Fields = std::map<std::string, std::string, std::less<>>;
 
 enum Op : std::uint8_t { message_op = 2, bag_op = 3, chunk_op = 5, chunk_info_op = 6, connection_op = 7 };
@@ -169,6 +175,12 @@ class Ros1Bag : public Bag {
     list_topics();
   }
 
+  double begin_s() const {
+    double begin_s = std::numeric_limits<double>::infinity();
+    for (const Chunk& chunk : chunks_) begin_s = std::min(begin_s, chunk.begin_s);
+    return begin_s;
+  }
+
   std::unique_ptr<BagMessages> messages(const BagTopic& topic) const override {
     const auto wanted = connections_.at({topic.name, topic.type});
     std::vector<std::uint64_t> chunks;
@@ -241,9 +253,64 @@ class Ros1Bag : public Bag {
   std::vector<Chunk> chunks_;
 };
 
+// One part's after the other.
+class ChainedMessages : public BagMessages {
+ public:
+  explicit ChainedMessages(std::deque<std::unique_ptr<BagMessages>> parts) : parts_(std::move(parts)) {}
+
+  std::optional<BagMessage> next() override {
+    for (; !parts_.empty(); parts_.pop_front()) {
+      auto message = parts_.front()->next();
+      recorded_s_ = parts_.front()->recorded_s();
+      if (message) return message;
+    }
+    return std::nullopt;
+  }
+  double recorded_s() const override { return recorded_s_; }
+
+ private:
+  std::deque<std::unique_ptr<BagMessages>> parts_;
+  double recorded_s_ = 0;
+};
+
+// A folder of the files of `rosbag record --split`.
+class SplitRos1Bag : public Bag {
+ public:
+  explicit SplitRos1Bag(const std::string& folder) : Bag(folder) {
+    std::error_code error;
+    for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error))
+      if (ends_like_ros1_bag(entry->path().string()))
+        parts_.push_back(std::make_unique<Ros1Bag>(entry->path().string()));
+    std::ranges::sort(parts_, {}, [](const auto& part) { return part->begin_s(); });
+    for (const auto& part : parts_)
+      for (const BagTopic& topic : part->topics()) add(topic);
+    remark_ = fmt::format("its {} bags are read as one, in the order of their times", parts_.size());
+  }
+
+  std::unique_ptr<BagMessages> messages(const BagTopic& topic) const override {
+    std::deque<std::unique_ptr<BagMessages>> messages;
+    for (const auto& part : parts_)
+      for (const BagTopic& of_part : part->topics())
+        if (is_same(of_part, topic)) messages.push_back(part->messages(of_part));
+    return std::make_unique<ChainedMessages>(std::move(messages));
+  }
+
+ private:
+  static bool is_same(const BagTopic& a, const BagTopic& b) { return a.name == b.name && a.type == b.type; }
+  void add(const BagTopic& topic) {
+    const auto known = std::ranges::find_if(topics_, [&](const BagTopic& one) { return is_same(one, topic); });
+    if (known == topics_.end()) return topics_.push_back(topic);
+    known->messages += topic.messages, known->duration_s += topic.duration_s;
+  }
+
+  std::vector<std::unique_ptr<Ros1Bag>> parts_;
+};
+
 }  // namespace
 
 std::unique_ptr<Bag> open_ros1_bag(const std::string& path) {
+  std::error_code error;
+  if (fs::is_directory(path, error)) return std::make_unique<SplitRos1Bag>(path);
   return std::make_unique<Ros1Bag>(path);
 }
 

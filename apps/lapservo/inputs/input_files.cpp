@@ -53,7 +53,7 @@ void InputFiles::add_recording(const fs::path& path) {
   std::error_code error;
   for (fs::directory_iterator entry(path, error), end; !error && entry != end; entry.increment(error))
     if (has_image_extension(entry->path()) || entry->path().extension() == ".yaml" ||
-        internal::ends_like(entry->path().string(), {".db3", ".mcap", ".mp4", ".json"}))
+        internal::ends_like(entry->path().string(), {".bag", ".db3", ".mcap", ".mp4", ".json"}))
       add(entry->path());
 }
 
