@@ -27,6 +27,7 @@
 #include "lapservo/io/frame_source.h"
 #include "lapservo/report/html_report.h"
 #include "lapservo/rig/registration_covariance.h"
+#include "lapservo/tool/dvrk_tool_file.h"
 
 namespace lapservo::app {
 using namespace internal;
@@ -352,7 +353,9 @@ std::string tip_text(const Instrument& instrument, const std::vector<FrameEviden
   std::sort(sizes_mm.rbegin(), sizes_mm.rend());
   std::vector<std::string> texts;
   for (const auto& [size_mm, from] : sizes_mm) texts.push_back(fmt::format("{:.2g} from {}", size_mm, from));
-  return fmt::format("known to {:.2g} mm: {}", median(whole_mm), fmt::join(texts, ", "));
+  const std::string on_axis = axis_tip_text(*instrument.tool);
+  return fmt::format("known to {:.2g} mm: {}{}{}", median(whole_mm), fmt::join(texts, ", "),
+                     on_axis.empty() ? "" : "; ", on_axis);
 }
 
 }  // namespace

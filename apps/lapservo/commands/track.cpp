@@ -387,7 +387,7 @@ class TrackRun {
     }
   }
 
-  // Says once a rig why an instrument has no tip.
+  // Says once a rig why an instrument has no tip, or which point it is.
   void begin_rig() {
     say_without_readings();
     rig_ = rigs_.rig();
@@ -397,7 +397,9 @@ class TrackRun {
     for (std::size_t i = 0; i < rig_->instruments.size(); ++i) {
       wrists_.push_back(live_wrist_ ? WristInput{std::nullopt, other_wrist_text(options_.joints, *rig_, i)}
                                     : find_wrist_input(options_, *rig_, i, source_, true));
-      say_no_tip(rig_->instruments[i], no_tip_text(rig_->instruments[i], wrists_[i]));
+      const std::string why = no_tip_text(rig_->instruments[i], wrists_[i]);
+      say_no_tip(rig_->instruments[i], why);
+      if (why.empty()) say_axis_tip(rig_->instruments[i]);
     }
   }
 

@@ -10,6 +10,7 @@
 #include "lapservo/core/error.h"
 #include "lapservo/crtk/joint_map.h"
 #include "lapservo/crtk/wrist_history.h"
+#include "lapservo/tool/dvrk_tool_file.h"
 #include "lapservo/tool/wrist.h"
 #include "recordings/bag_joints.h"
 #include "recordings/bag_topics.h"
@@ -146,6 +147,10 @@ std::string no_tip_text(const Instrument& instrument, const WristInput& wrist) {
   if (!instrument.tool->place)
     return "the rig does not say where the tool sits behind the marker: lapservo calibrate tip measures it";
   return wrist.none;
+}
+
+void say_axis_tip(const Instrument& instrument) {
+  if (instrument.tool) say_remark(instrument.name, axis_tip_text(*instrument.tool));
 }
 
 void WristInput::add(const Observation& observation, double time_s) {

@@ -54,6 +54,9 @@ std::string other_wrist_text(const std::string& source, const Rig& rig, std::siz
 /// Why an instrument's tip is not known, with the remedy; empty where it is, and without a tool.
 std::string no_tip_text(const Instrument& instrument, const WristInput& wrist);
 
+/// Says on stderr which point the tip is where its tool's file ends on an axis; nothing of other tools.
+void say_axis_tip(const Instrument& instrument);
+
 /// Why none of its frames has a tip though no_tip_text() is empty: the times of the frames and of the readings; empty
 /// where one has, and without frames or readings.
 std::string no_reading_text(const Instrument& instrument, const WristInput& wrist);

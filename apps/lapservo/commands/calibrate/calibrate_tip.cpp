@@ -109,6 +109,7 @@ int calibrate_tip(CalibrateTipOptions options, const Command& command) {
   InstrumentJob job(options, false);
   job.begin();
   const Tool tool = job.instrument().tool.value_or(Tool{});
+  say_axis_tip(job.instrument());
   const auto way = !options.pivot.empty() ? by_pivot : !options.touches.empty() ? by_touch : by_calliper;
   const TipCalibration calibration = way(options, job.rig, job.index, tool);
   if (!calibration.refusal.empty()) return job.refuse(calibration.refusal);

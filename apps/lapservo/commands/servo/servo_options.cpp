@@ -151,6 +151,7 @@ RunConfig run_config_of(const ServoOptions& options) {
   if (run.controller.mode != ControlMode::uncalibrated) require_registration(run.rig, options.rig);
   const std::string goal = goal_option(options);
   run.trajectory_name = goal == "--trajectory" ? options.trajectory : goal;
+  say_axis_tip(run.rig.instruments.front());
   // The paper's law comes with the paper's eyes.
   const bool own = options.tracker.empty() && run.controller.mode == ControlMode::paper;
   run.tracker.method = own || options.tracker == "centerline" ? Method::centerline : Method::surface;
