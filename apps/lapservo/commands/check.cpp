@@ -198,10 +198,9 @@ CheckLines arm_lines(const ArmCheck& arm) {
 CheckLines rcm_lines(const RcmCheck& rcm) {
   if (!rcm.refusal.empty()) return {{"RCM", "unknown: " + rcm.refusal}};
   CheckLines lines;
-  lines.push_back(
-      {"RCM", fmt::format("axes miss where they meet by {:.2f} mm rms",
-                          1e3 * rms(rcm.misses_m, [](const auto& miss) { return miss.second; })) +
-                  (rcm.distance_m ? ", which is off the rig's by " + told(*rcm.distance_m, 1e3, "mm") : "")});
+  lines.push_back({"RCM", fmt::format("axes miss where they meet by {:.2f} mm rms",
+                                      1e3 * rms(rcm.misses_m, [](const auto& miss) { return miss.second; })) +
+                              ", which is off the rig's by " + told(rcm.distance_m, 1e3, "mm")});
   lines.push_back({"drift", "the RCM moves by " + told(rcm.drift_m, 1e3, "mm") + " over the recording"});
   return lines;
 }
@@ -405,7 +404,7 @@ int check(const CalibrateOptions& options) {
     if (joints && !evidence.poses().empty())
       checked.findings.arm = check_arm(instrument, rig.camera, evidence.poses(), evidence.tracked_psi(),
                                        joints->recording, joints->source);
-    else
+    else if (instrument.camera_from_rcm)
       checked.findings.rcm = check_rcm(instrument, evidence.poses());
     progress.show(2, " of 3: the work space");
     checked.findings.work_space = survey_work_space(rig, index, evidence);

@@ -219,7 +219,13 @@ class Advisor {
           "mend that; where it was the recording, record the marker and the joints again; then lapservo check",
           "delay, registration and focal length");
     if (!f_.registered) {
-      add(true, "the rig has no camera_from_rcm", command, "theta, phi, rho, psi and r, which are unknown without");
+      if (f_.has_joints)
+        add(true, "the rig has no camera_from_rcm", command, "theta, phi, rho, psi and r, which are unknown without");
+      else
+        add(false,
+            "delay, focal length and registration are not checked: they need joints, and the rig has no "
+            "camera_from_rcm; the marker's pose in the camera frame needs neither",
+            std::string("for a robot, ") + command, "theta, phi, rho, psi and r");
       return;
     }
     if (f_.arm) {
@@ -250,16 +256,16 @@ class Advisor {
       add(f_.rcm->refusal == reversed_marker, "whether the RCM is right is unknown: " + f_.rcm->refusal,
           f_.rcm->refusal == reversed_marker ? mount_anew : "record a swing, then lapservo check",
           "an RCM that is off bends every pose");
-    else if (f_.rcm->distance_m && f_.rcm->distance_m->exceeds(2 * rig_limits.place_m))
+    else if (f_.rcm->distance_m.exceeds(2 * rig_limits.place_m))
       add(true,
-          fmt::format("the axes meet {:.1f} mm from the rig's RCM (sigma {:.1f} mm)", 1e3 * f_.rcm->distance_m->value,
-                      1e3 * f_.rcm->distance_m->sigma),
+          fmt::format("the axes meet {:.1f} mm from the rig's RCM (sigma {:.1f} mm)", 1e3 * f_.rcm->distance_m.value,
+                      1e3 * f_.rcm->distance_m.sigma),
           std::string(command) + " --joints", "poses that the RCM does not bend");
-    else if (f_.rcm->distance_m && f_.rcm->distance_m->sigma > 2 * rig_limits.place_m)
+    else if (f_.rcm->distance_m.sigma > 2 * rig_limits.place_m)
       add(true,
           fmt::format("this recording does not show whether the rig's RCM is right: it places the RCM to {:.1f} mm, "
                       "one sigma: {}",
-                      1e3 * f_.rcm->distance_m->sigma, swing_more),
+                      1e3 * f_.rcm->distance_m.sigma, swing_more),
           "record a longer swing, or the joints too; then lapservo check", "whether the RCM is right");
     if (!f_.has_joints)
       add(false, "delay, focal length and the joints' offsets are unknown without the joints",
@@ -322,9 +328,8 @@ RcmCheck check_rcm(const Instrument& instrument, const std::vector<TimedPose>& p
   const Registration registration = register_rcm(instrument, poses);
   if (!registration.refusal.empty()) return check.refusal = registration.refusal, check;
   for (const RegistrationResidual& r : registration.residuals) check.misses_m.emplace_back(r.time_s, r.position_m);
-  if (instrument.camera_from_rcm)
-    check.distance_m = Told{(instrument.camera_from_rcm->translation - registration.camera_from_rcm.translation).norm(),
-                            registration.sigma_translation_m.norm()};
+  check.distance_m = {(instrument.camera_from_rcm->translation - registration.camera_from_rcm.translation).norm(),
+                      registration.sigma_translation_m.norm()};
   const auto middle = poses.begin() + static_cast<std::ptrdiff_t>(poses.size() / 2);
   const auto first = axes_meeting_point({poses.begin(), middle}), second = axes_meeting_point({middle, poses.end()});
   if (first && second)

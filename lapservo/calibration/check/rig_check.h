@@ -44,13 +44,14 @@ struct PrintCheck {
 };
 PrintCheck check_print(const Rig& rig, std::size_t instrument, std::vector<KeyFrame> frames);
 
-/// The RCM by the image alone, for recordings without joints.
+/// The RCM of a registered rig by the image alone, for recordings without joints.
 struct RcmCheck {
   std::string refusal;
-  std::optional<Told> distance_m;                   ///< of the rig's RCM from it
+  Told distance_m;                                  ///< of the rig's RCM from it
   Told drift_m;                                     ///< between the recording's halves
   std::vector<std::pair<double, double>> misses_m;  ///< time, by how much the axis misses it
 };
+/// The instrument has camera_from_rcm.
 RcmCheck check_rcm(const Instrument& instrument, const std::vector<TimedPose>& poses);
 
 /// One standard deviation of the roll about the shaft, over the image at one depth.
@@ -87,7 +88,7 @@ struct RigFindings {
   bool response_measured = false;  ///< by `calibrate camera`: `calibrate colour` alone would keep it
   std::optional<PrintCheck> print;
   std::optional<ArmCheck> arm;  ///< with joints
-  std::optional<RcmCheck> rcm;  ///< without
+  std::optional<RcmCheck> rcm;  ///< without, of a registered rig
   bool registered = false;      ///< the rig has camera_from_rcm
   MissedRcm missed_rcm;         ///< of a registered rig: frames that are ok, and without q
   bool has_joints = false;      ///< of the recording

@@ -91,6 +91,13 @@ class CheckRig : public ::testing::Test {
     EXPECT_TRUE(testing::has(texts.front(), word));
   }
 
+  static RigFindings well_lit() {
+    RigFindings findings;
+    findings.light = MarkerLight{.value = 200, .chroma = 100};
+    findings.registered = true, findings.width_px = 100;
+    return findings;
+  }
+
   Rig rig = true_rig();
   Instrument& instrument = rig.instruments[0];
   const JointRecording joints = joints_meanwhile();
@@ -220,9 +227,7 @@ TEST_F(CheckRig, CallsNoRigGoodWhosePrintSlips) {
   std::copy_n(pictures().begin(), frames / 2, both.begin());
   KeyFrames keys(rig, 0);
   for (std::size_t i = 0; i < both.size(); ++i) keys.add(both[i], static_cast<double>(i) / fps);
-  RigFindings findings;
-  findings.light = MarkerLight{.value = 200, .chroma = 100};
-  findings.registered = true, findings.width_px = 100;
+  RigFindings findings = well_lit();
   findings.print = check_print(rig, 0, keys.take());
   expect_first(findings, "the print slips");
 }
@@ -252,9 +257,8 @@ TEST_F(CheckRig, NamesAWrongResponseFirst) {
 // The same marker at the same place may well suffice without losses.
 TEST_F(CheckRig, SeesAPoorWorkSpaceInACompressedRecordingAsTheRecordings) {
   for (const bool lossy : {false, true}) {
-    RigFindings findings;
-    findings.light = MarkerLight{.value = 200, .chroma = 100};
-    findings.registered = true, findings.width_px = 100, findings.lossy = lossy;
+    RigFindings findings = well_lit();
+    findings.lossy = lossy;
     findings.work_space = WorkSpace{.good = 0, .worst_rad = 0.015, .places = 30};
     expect_first(findings, lossy ? "-> record without losses" : "-> come nearer");
   }
@@ -265,13 +269,26 @@ TEST_F(CheckRig, WithoutJointsComparesTheRcm) {
   for (std::size_t i = 0; i < pictures().size(); ++i) evidence.add(pictures()[i], static_cast<double>(i) / fps);
   const RcmCheck right = check_rcm(instrument, evidence.poses());
   ASSERT_EQ(right.refusal, "");
-  EXPECT_LT(right.distance_m->value, 0.5e-3);
+  EXPECT_LT(right.distance_m.value, 0.5e-3);
   instrument.camera_from_rcm->translation.x() += 10e-3;
   RigFindings findings = findings_of(rig, 0, evidence);
   findings.rcm = check_rcm(instrument, evidence.poses());
   expect_first(findings, "axes meet");
   findings.rcm->distance_m = Told{1.8e-3, 2.15e-3};
   expect_first(findings, "does not show whether the rig's RCM is right");
+}
+
+// A camera alone gives poses in its frame, which need no joints.
+TEST_F(CheckRig, NeedsARegistrationOnlyForRecordingsWithJoints) {
+  for (const bool has_joints : {false, true}) {
+    RigFindings findings = well_lit();
+    findings.registered = false, findings.has_joints = has_joints;
+    const auto all = advice_on(findings);
+    ASSERT_EQ(all.size(), 1U);
+    EXPECT_EQ(all[0].needed, has_joints);
+    EXPECT_TRUE(
+        testing::has(all[0].what, has_joints ? "the rig has no camera_from_rcm" : "are not checked: they need joints"));
+  }
 }
 
 // Too few for the axes' meeting point, and each of them shows it.
