@@ -5,6 +5,8 @@
 
 #include <gtest/gtest.h>
 
+#include "lapservo/core/spread.h"
+
 namespace lapservo::internal::statistics_test {
 
 TEST(Statistics, AQuantileIsOneOfTheValuesAndTheMedianOfAnEvenNumberTheUpperOne) {
@@ -24,6 +26,15 @@ TEST(Statistics, TheRootMeanSquareIsOfValuesMembersAndFunctions) {
   EXPECT_DOUBLE_EQ(rms(std::vector<Item>{{1}, {7}}, &Item::error), 5);
   EXPECT_DOUBLE_EQ(rms(std::vector<Item>{{1}, {7}}, [](const Item& item) { return 2 * item.error; }), 10);
   EXPECT_EQ(rms(std::vector<double>{}), 0);
+}
+
+TEST(Spread, KeepsSomeOfManyItems) {
+  Spread<int> kept(8);
+  for (int i = 0; i < 100; ++i) kept.add([i] { return i; });
+  const std::vector<int>& items = kept.items();
+  ASSERT_LE(items.size(), 8U);
+  ASSERT_GE(items.size(), 4U);
+  for (std::size_t i = 0; i < items.size(); ++i) EXPECT_EQ(items[i], static_cast<int>(i) * items[1]);
 }
 
 }  // namespace lapservo::internal::statistics_test

@@ -12,7 +12,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "lapservo/calibration/check/rig_check.h"
-#include "lapservo/calibration/colour/marker_light.h"
+#include "lapservo/calibration/colour/hue_faults.h"
 #include "lapservo/calibration/recording/frame_recording.h"
 #include "lapservo/calibration/registration/timed_pose.h"
 #include "lapservo/core/angles.h"
@@ -314,6 +314,11 @@ void FrameDiagnosis::add(const cv::Mat& bgr, const std::vector<Observation>& obs
       continue;
     }
     ++seen.missed.shown;
+    if (observation.marker)
+      seen.lights.add([&] {
+        return light_of_marker(bgr, rig_.camera, rig_.instruments[i].marker,
+                               {observation.camera_from_unrolled, observation.psi_rad});
+      });
     const auto& camera_from_rcm = rig_.instruments[i].camera_from_rcm;
     any_result |= observation.rcm || !camera_from_rcm;
     if (!camera_from_rcm || observation.rcm || !observation.marker) continue;
@@ -334,9 +339,10 @@ void FrameDiagnosis::keep(const cv::Mat& bgr) {
 
 std::string FrameDiagnosis::text(bool lossy) const {
   if (frames_ == 0) return no_frame;
-  if (2 * without_instrument_ <= frames_) return text_of_missed_rcm();
-  const std::string shown = cause_in_frames(without_instrument_ == frames_);
-  return shown.empty() ? text_of_refusals(lossy) : shown;
+  const bool seldom_shown = 2 * without_instrument_ > frames_;
+  std::string shown = seldom_shown ? cause_in_frames(without_instrument_ == frames_) : text_of_missed_rcm();
+  if (shown.empty()) shown = text_of_moving_hues();
+  return shown.empty() && seldom_shown ? text_of_refusals(lossy) : shown;
 }
 
 std::string FrameDiagnosis::text_of_refusals(bool lossy) const {
@@ -402,6 +408,22 @@ std::string FrameDiagnosis::cause_in_frames(bool found_nowhere) const {
   if (std::ranges::all_of(lights, &PictureLight::overexposed))
     return "the frames are overexposed, and their hues with them: lower the exposure, the gain or the light";
   return found_nowhere ? otherwise.other_bands() : "";
+}
+
+std::string FrameDiagnosis::text_of_moving_hues() const {
+  for (std::size_t i = 0; i < rig_.instruments.size(); ++i) {
+    const auto seen = seen_.find(rig_.instruments[i].name);
+    if (seen == seen_.end() || seen->second.missed.shown >= rig_limits.found * frames_) continue;
+    std::vector<FrameHues> hues;
+    for (const auto& light : seen->second.lights.items())
+      if (light) hues.push_back(frame_hues(*light, rig_.instruments[i].marker));
+    if (hues.empty()) continue;
+    for (const HueFault& fault : recorded_hues(hues).faults)
+      if (fault.size_deg > rig_limits.hue_deg)
+        return fmt::format("{}: {} of {} frames do not show it, and in those that do {}", seen->first,
+                           frames_ - seen->second.missed.shown, frames_, fault.text());
+  }
+  return "";
 }
 
 std::string FrameDiagnosis::text_of_missed_rcm() const {

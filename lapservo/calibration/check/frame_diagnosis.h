@@ -2,12 +2,15 @@
 
 #include <cstddef>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include <Eigen/Core>
 #include <opencv2/core.hpp>
 
+#include "lapservo/calibration/colour/marker_light.h"
+#include "lapservo/core/spread.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/vision/observation.h"
 #include "lapservo/vision/status.h"
@@ -56,7 +59,8 @@ class FrameDiagnosis {
   void add(const cv::Mat& bgr, const std::vector<Observation>& observations);
 
   /// One line that names the most probable cause and its remedy, without a full stop; empty where at least half of the
-  /// frames show an instrument, and at least half of those give q, or features where the rig has no camera_from_rcm.
+  /// frames show an instrument, and at least half of those give q, or features where the rig has no camera_from_rcm,
+  /// unless the bands' hues move where an instrument is lost in some.
   /// `lossy`: the recording is compressed.
   std::string text(bool lossy = false) const;
 
@@ -70,12 +74,14 @@ class FrameDiagnosis {
  private:
   struct Seen {
     std::map<Status, int> refused;
-    MissedRcm missed;  ///< where q is missing
+    MissedRcm missed;                               ///< where q is missing
+    Spread<std::optional<MarkerLight>> lights{48};  ///< where it is found
   };
   void keep(const cv::Mat& bgr);
   std::string cause_in_frames(bool found_nowhere) const;
   std::string text_of_refusals(bool lossy) const;
   std::string text_of_missed_rcm() const;
+  std::string text_of_moving_hues() const;
 
   Rig rig_;
   bool deinterlaced_;

@@ -103,6 +103,20 @@ TEST_F(FrameDiagnosisTest, NamesCompressionOverexposureAndATurnedCamera) {
   expect_names(text(rig, [](cv::Mat& bgr) { cv::rotate(bgr, bgr, cv::ROTATE_180); }), "turned by 180 degrees");
 }
 
+// Nine frames under a white balance that moves, or not, and three without the marker.
+TEST_F(FrameDiagnosisTest, NamesHuesThatMoveWhereFramesAreLost) {
+  for (const double by : {0.0, 0.3}) {
+    int i = 0;
+    const std::string line = text(rig, [&](cv::Mat& bgr) {
+      const double part = by * (i / 9.0 - 0.5);
+      cv::multiply(bgr, i++ < 9 ? cv::Scalar(1 + part, 1, 1 - part) : cv::Scalar(), bgr);
+    });
+    EXPECT_EQ(line.find("3 of 12 frames do not show it, and in those that do the hues move by") != std::string::npos,
+              by > 0)
+        << line;
+  }
+}
+
 TEST_F(FrameDiagnosisTest, NamesTheBandsWhereThePrintIsAnother) {
   Rig other = rig;
   Marker& marker = other.instruments[0].marker;

@@ -53,6 +53,8 @@ void add_light(const std::vector<FrameEvidence>& frames, const Marker& marker, R
     light.hues_deg[band] = typical([=](const MarkerLight& of) { return of.hues_deg[band]; });
     findings.hue_error_deg = std::max(findings.hue_error_deg, hue_gap_deg(light.hues_deg[band], marker.hues_deg[band]));
   }
+  findings.hue_faults =
+      recorded_hues(values_of(lit, [&](const FrameEvidence& f) { return frame_hues(*f.light, marker); })).faults;
   findings.width_px = median(values_of(lit, &FrameEvidence::width_px));
 }
 
@@ -108,6 +110,9 @@ class Advisor {
     if (f_.light && f_.hue_error_deg > rig_limits.hue_deg)
       add(true, fmt::format("the bands' hues are {:.0f} degrees from the rig's", f_.hue_error_deg),
           "lapservo calibrate colour", "the marker is found where its colours are near the limit now");
+    for (const HueFault& fault : f_.hue_faults)
+      add(fault.size_deg > rig_limits.hue_deg, fault.what, fault.remedy + ", and record again",
+          "hues that stay the rig's: where they leave them the marker is not found");
     if ((f_.light && f_.cause.empty()) || clipped() || dark()) return;
     add(true, found_text() + f_.cause, "mend that, and record again where it was the recording", "finding it at all");
   }

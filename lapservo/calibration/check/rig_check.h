@@ -9,6 +9,7 @@
 #include "lapservo/calibration/check/arm_check.h"
 #include "lapservo/calibration/check/frame_diagnosis.h"
 #include "lapservo/calibration/check/rig_evidence.h"
+#include "lapservo/calibration/colour/hue_faults.h"
 #include "lapservo/calibration/marker/marker_calibration.h"
 #include "lapservo/rig/rig.h"
 
@@ -82,7 +83,8 @@ struct RigFindings {
   PictureLight picture;
   std::optional<MarkerLight> light;  ///< medians; empty when no frame shows the marker
   double hue_error_deg = 0;          ///< the largest of the three bands'
-  double width_px = 0;               ///< median
+  std::vector<HueFault> hue_faults;
+  double width_px = 0;  ///< median
   std::optional<MarkerResponse::Result> response;
   bool lossy = false;              ///< the recording: compression moves the edges of channels, too
   bool response_measured = false;  ///< by `calibrate camera`: `calibrate colour` alone would keep it

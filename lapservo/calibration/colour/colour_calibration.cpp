@@ -2,16 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <Eigen/Core>
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
 
 #include "lapservo/calibration/check/frame_diagnosis.h"
+#include "lapservo/calibration/colour/hue_faults.h"
 #include "lapservo/calibration/colour/marker_light.h"
 #include "lapservo/core/angles.h"
-#include "lapservo/core/departures.h"
 #include "lapservo/core/rounded_sigma.h"
+#include "lapservo/core/spread.h"
 #include "lapservo/core/statistics.h"
 #include "lapservo/vision/colour/colour_classes.h"
 #include "lapservo/vision/tracker.h"
@@ -24,10 +26,7 @@ constexpr double reach_deg = 65;        // between an ink's hue and the rig's
 constexpr double least_apart_deg = 40;  // between two bands: nearer, and each keeps no room for light and shade
 constexpr double max_clipped = 0.3;     // of the marker's pixels: their hues are the sensor's, not the ink's
 constexpr double least_move_m = 1.5e-3, least_turn_rad = 0.5;  // of the marker, rms: either
-constexpr double least_fault_deg = 2;                          // smaller ones are not worth a word
-constexpr double hue_floor_deg = 0.5;                          // light, shade and white balance of the day
 constexpr double max_sigma_deg = 12;                           // the largest that may be written
-constexpr int frames_alike = 4;                                // whose light and place err alike
 
 Rig with_hues(Rig rig, std::size_t instrument, const std::array<double, 3>& hues_deg) {
   for (Instrument& of : rig.instruments) of.camera_from_rcm.reset();
@@ -102,63 +101,9 @@ std::array<double, 3> best_start(const Rig& rig, std::size_t instrument, const s
   return best;
 }
 
-// Hues of one frame beyond the marker's, and its brightness.
-struct FrameHues {
-  std::array<double, 3> beyond_deg;
-  double value;
-};
-
-// How the hues depart from one number each; the variances count that.
-struct HueFaults {
-  std::array<double, 3> variance_deg2{};
-  std::vector<std::string> texts;
-};
-
-// Over the time and with the brightness, the range of each between -1/2 and 1/2. A hue lies as far from the middle of
-// the time as at other times, rms, so that its sigma counts the motion.
-HueFaults hue_faults(const std::vector<FrameHues>& frames, const std::array<double, 3>& middle_deg) {
-  const auto rows = 3 * static_cast<Eigen::Index>(frames.size());
-  const auto [darkest, brightest] = std::ranges::minmax_element(frames, {}, &FrameHues::value);
-  LinearFit fit;
-  fit.alike_groups = frames_alike, fit.residuals.resize(rows);
-  Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(rows, 3), slopes = Eigen::MatrixXd::Zero(rows, 6);
-  for (std::size_t i = 0; i < frames.size(); ++i) {
-    const double time = (static_cast<double>(i) + 0.5) / static_cast<double>(frames.size()) - 0.5 - 1 / std::sqrt(12.0);
-    const double light =
-        (frames[i].value - (darkest->value + brightest->value) / 2) / std::max(1.0, brightest->value - darkest->value);
-    fit.groups.push_back(3 * static_cast<Eigen::Index>(i));
-    for (Eigen::Index band = 0; band < 3; ++band) {
-      const Eigen::Index row = fit.groups.back() + band;
-      fit.residuals[row] =
-          middle_deg[static_cast<std::size_t>(band)] - frames[i].beyond_deg[static_cast<std::size_t>(band)];
-      jacobian(row, band) = 1, slopes(row, band) = time, slopes(row, 3 + band) = light;
-    }
-  }
-  fit.groups.push_back(rows), fit.jacobian = jacobian.sparseView();
-  const Departures departures = departures_of(fit, slopes);
-  HueFaults result;
-  for (std::size_t band = 0; band < 3; ++band) {
-    const auto k = static_cast<Eigen::Index>(band);
-    result.variance_deg2[band] = departures.by_seen(k, k) + departures.by_instead(k, k);
-  }
-  std::array<double, 2> most_deg{};  // over the time, with the brightness
-  for (const Fault& fault : departures.seen)
-    most_deg[fault.which / 3] = std::max(most_deg[fault.which / 3], std::abs(fault.size));
-  if (most_deg[0] > least_fault_deg)
-    result.texts.push_back(
-        fmt::format("the hues move by {:.1f} degrees over the recording: fix the white balance, let the light warm up",
-                    most_deg[0]));
-  if (most_deg[1] > least_fault_deg)
-    result.texts.push_back(
-        fmt::format("the hues change by {:.1f} degrees from the darkest frame to the brightest: fix the exposure, "
-                    "switch other lights off",
-                    most_deg[1]));
-  return result;
-}
-
 struct MeasuredHues {
   std::array<double, 3> hues_deg{}, sigma_deg{};
-  std::vector<std::string> faults;
+  std::vector<HueFault> faults;
   int found = 0;
   double clipped = 0, moved_m = 0, turned_rad = 0;
 };
@@ -184,25 +129,15 @@ MeasuredHues measure(const Rig& rig, std::size_t instrument, const std::vector<c
     const auto light = light_of_marker(frame, rig.camera, marker, pose);
     if (!light) continue;
     clipped.push_back(light->clipped);
-    auto& beyond_deg = hues.emplace_back(FrameHues{light->hues_deg, light->value}).beyond_deg;
-    for (std::size_t band = 0; band < 3; ++band) beyond_deg[band] -= marker.hues_deg[band];
+    hues.push_back(frame_hues(*light, marker));
   }
   measured.hues_deg = marker.hues_deg;
   if (clipped.empty()) return measured;
   measured.clipped = median(clipped);
-  std::array<double, 3> middle_deg, scatter_deg;
-  for (std::size_t band = 0; band < 3; ++band) {
-    auto beyond_deg = values_of(hues, [=](const FrameHues& frame) { return frame.beyond_deg[band]; });
-    middle_deg[band] = median(std::vector(beyond_deg));
-    measured.hues_deg[band] = std::fmod(marker.hues_deg[band] + middle_deg[band] + 360, 360.0);
-    for (double& beyond : beyond_deg) beyond -= middle_deg[band];
-    scatter_deg[band] = robust_scale(beyond_deg) / std::sqrt(static_cast<double>(hues.size()) / frames_alike);
-  }
-  const HueFaults faults = hue_faults(hues, middle_deg);
-  measured.faults = faults.texts;
+  RecordedHues recorded = recorded_hues(hues);
   for (std::size_t band = 0; band < 3; ++band)
-    measured.sigma_deg[band] =
-        std::sqrt(hue_floor_deg * hue_floor_deg + std::pow(scatter_deg[band], 2) + faults.variance_deg2[band]);
+    measured.hues_deg[band] = std::fmod(marker.hues_deg[band] + recorded.beyond_deg[band] + 360, 360.0);
+  measured.sigma_deg = recorded.sigma_deg, measured.faults = std::move(recorded.faults);
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   for (const auto& place : places) mean += place / static_cast<double>(places.size());
   double squares = 0;
@@ -236,23 +171,13 @@ std::string refusal_of(const MeasuredHues& measured, std::size_t frames, const s
         "white balance",
         apart_deg, least_apart_deg);
   if (*std::max_element(measured.sigma_deg.begin(), measured.sigma_deg.end()) > max_sigma_deg)
-    return "the hues are not those of one light: " +
-           (measured.faults.empty() ? "they scatter from frame to frame; light the marker evenly" : measured.faults[0]);
+    return "the hues are not those of one light: " + (measured.faults.empty()
+                                                          ? "they scatter from frame to frame; light the marker evenly"
+                                                          : measured.faults[0].text());
   return {};
 }
 
 }  // namespace
-
-void SpreadFrames::add(const cv::Mat& bgr) {
-  if (seen_++ % every_ != 0) return;
-  if (frames_.size() == most_) {
-    std::vector<cv::Mat> half;
-    for (std::size_t i = 0; i < frames_.size(); i += 2) half.push_back(frames_[i]);
-    frames_ = std::move(half), every_ *= 2;
-    if ((seen_ - 1) % every_ != 0) return;
-  }
-  frames_.push_back(bgr.clone());
-}
 
 ColourCalibration calibrate_colour(const Rig& rig, std::size_t instrument, const std::vector<cv::Mat>& frames,
                                    bool keep_response, bool lossy, const JobWatch& watch) {
@@ -280,7 +205,7 @@ ColourCalibration calibrate_colour(const Rig& rig, std::size_t instrument, const
   calibration.refusal = refusal_of(measured, frames.size(), of.name);
   if (!calibration.refusal.empty()) return calibration;
   calibration.hues_deg = hues_deg, calibration.sigma_hues_deg = measured.sigma_deg;
-  calibration.faults = measured.faults;
+  calibration.faults = values_of(measured.faults, &HueFault::text);
   progress("the response");
   if (const auto result = response.result()) {
     if (!keep_response) calibration.response = result->better;
@@ -335,22 +260,22 @@ cv::Mat segmentation_picture(const cv::Mat& bgr, const Rig& rig) {
 ColourCalibration measure_colour(const Rig& rig, std::size_t instrument, const FrameRecording& recording,
                                  bool replace_response, const JobWatch& watch) {
   constexpr std::size_t most = 48;
-  SpreadFrames kept(most);
+  Spread<cv::Mat> kept(most);
   const bool live = recording.source.kind() == FrameSource::Kind::live;
   const FramesRead read = read_frames(recording, rig, live ? 10 : 1, watch, [&](const cv::Mat& bgr, double) {
-    kept.add(bgr);
-    return fmt::format(", {} kept", kept.frames().size());
+    kept.add([&] { return bgr.clone(); });
+    return fmt::format(", {} kept", kept.items().size());
   });
   ColourCalibration calibration;
   if (read.stopped) return calibration.refusal = "stopped", calibration;
   const bool is_named = recording.source.is_srgb();
   const bool keep_response = is_named || (!replace_response && rig.camera.response.sigma.has_value());
-  calibration = calibrate_colour(rig, instrument, kept.frames(), keep_response, read.lossy, watch);
+  calibration = calibrate_colour(rig, instrument, kept.items(), keep_response, read.lossy, watch);
   calibration.read = read;
   if (is_named) calibration.response_found = "as it is: the recording names how it encodes light";
   if (!calibration.refusal.empty() && 2 * calibration.found_before < static_cast<int>(calibration.frames)) {
     FrameDiagnosis diagnosis(rig);
-    for (const cv::Mat& bgr : kept.frames()) diagnosis.add(bgr, {});
+    for (const cv::Mat& bgr : kept.items()) diagnosis.add(bgr, {});
     calibration.refusal += diagnosis.cause();
   }
   return calibration;

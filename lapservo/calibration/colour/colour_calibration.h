@@ -12,18 +12,6 @@
 
 namespace lapservo::internal {
 
-/// Keeps some frames of a recording, evenly spread over it, however long it is.
-class SpreadFrames {
- public:
-  explicit SpreadFrames(std::size_t most) : most_(most) {}
-  void add(const cv::Mat& bgr);
-  const std::vector<cv::Mat>& frames() const { return frames_; }
-
- private:
-  std::size_t most_, seen_ = 0, every_ = 1;
-  std::vector<cv::Mat> frames_;
-};
-
 struct ColourCalibration {
   /// Why there is none, and what to do about it: then nothing else counts. Empty when there is one.
   std::string refusal;

@@ -47,26 +47,17 @@ class CalibrateColour : public ::testing::Test {
 };
 
 TEST_F(CalibrateColour, FindsInksThatAreNotTheRigs) {
-  for (const auto& hues_deg : {std::array{132.0, 222.0, 304.0}, std::array{74.0, 146.0, 236.0}}) {
+  for (const auto& hues_deg : {std::array{132.0, 222.0, 304.0}, {74.0, 146.0, 236.0}, {138.0, 196.0, 262.0}}) {
     real.instruments[0].marker.hues_deg = hues_deg;
     const Film film;
     const auto found = calibrate_colour(rig, 0, filmed(real, film));
     ASSERT_EQ(found.refusal, "");
-    EXPECT_LE(found.found_before, found.found);
+    EXPECT_TRUE(hues_deg[0] != 138 || found.found_before == 0);  // the rig does not see it at all
     EXPECT_EQ(found.found, film.frames);
     expect_hues(found, 4);
     EXPECT_FALSE(found.response) << found.response_found;
     for (const double sigma_deg : found.sigma_hues_deg) EXPECT_LT(sigma_deg, 3);
   }
-}
-
-TEST_F(CalibrateColour, FindsWhatTheRigDoesNotSeeAtAll) {
-  real.instruments[0].marker.hues_deg = {138, 196, 262};
-  const auto found = calibrate_colour(rig, 0, filmed(real, {}));
-  ASSERT_EQ(found.refusal, "");
-  EXPECT_EQ(found.found_before, 0);
-  EXPECT_EQ(found.found, 24);
-  expect_hues(found, 4);
 }
 
 TEST_F(CalibrateColour, TellsAnotherResponse) {
@@ -142,16 +133,6 @@ TEST_F(CalibrateColour, NamesHuesThatAreNotOne) {
       EXPECT_TRUE(by != 0.2 || has(said, over_time ? "over the recording" : "to the brightest")) << said;
       EXPECT_TRUE(by < 0.6 || !over_time || !found.refusal.empty());
     }
-}
-
-TEST_F(CalibrateColour, KeepsSomeOfManyFrames) {
-  SpreadFrames kept(8);
-  for (int i = 0; i < 100; ++i) kept.add(cv::Mat(1, 1, CV_8UC3, cv::Scalar(i, 0, 0)));
-  ASSERT_LE(kept.frames().size(), 8U);
-  ASSERT_GE(kept.frames().size(), 4U);
-  const int apart = kept.frames()[1].at<cv::Vec3b>(0, 0)[0] - kept.frames()[0].at<cv::Vec3b>(0, 0)[0];
-  for (std::size_t i = 1; i < kept.frames().size(); ++i)
-    EXPECT_EQ(kept.frames()[i].at<cv::Vec3b>(0, 0)[0] - kept.frames()[i - 1].at<cv::Vec3b>(0, 0)[0], apart);
 }
 
 }  // namespace
