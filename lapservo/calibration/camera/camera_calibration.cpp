@@ -49,23 +49,56 @@ Rigid3 pose_of(const cv::Mat& rotation_vector, const cv::Mat& translation) {
   return {rotation_by(vector_of(rotation_vector)), vector_of(translation)};
 }
 
+struct AllPoints {
+  std::vector<std::vector<cv::Point3f>> on_board;  // by view
+  std::vector<std::vector<cv::Point2f>> in_picture;
+
+  AllPoints(const Board& board, const std::vector<BoardView>& views) {
+    for (const BoardView& view : views) {
+      Points points = points_of(board, view.corners);
+      on_board.push_back(std::move(points.on_board)), in_picture.push_back(std::move(points.in_picture));
+    }
+  }
+};
+
+// A sentence where, by the corners alone, the lens sees more than plumb_bob serves and an equidistant one explains the
+// views better; else empty.
+std::string fisheye_text(const Board& board, const std::vector<BoardView>& views) {
+  constexpr double least_field_deg = 100, clearly_less = 0.9;
+  const AllPoints all(board, views);
+  const cv::Size size = views.front().bgr.size();
+  cv::Mat matrix, distortion, equidistant_matrix, equidistant_distortion;
+  std::vector<cv::Mat> rotations, translations, other_rotations, other_translations;
+  try {
+    const double plumb_bob_px =
+        cv::calibrateCamera(all.on_board, all.in_picture, size, matrix, distortion, rotations, translations);
+    const double equidistant_px = cv::fisheye::calibrate(
+        all.on_board, all.in_picture, size, equidistant_matrix, equidistant_distortion, other_rotations,
+        other_translations, cv::fisheye::CALIB_RECOMPUTE_EXTRINSIC | cv::fisheye::CALIB_FIX_SKEW);
+    const double field_deg = deg_from_rad(std::hypot(size.width, size.height) / equidistant_matrix.at<double>(0, 0));
+    if (!(field_deg > least_field_deg) || !(equidistant_px < clearly_less * plumb_bob_px)) return {};
+    return fmt::format(
+        "the lens is a fisheye of some {:.0f} degrees: an equidistant one misses the corners by {:.2f} px rms, "
+        "plumb_bob, the one distortion_model of lapservo, by {:.2f} px; take another lens or the middle {:.0f} degrees "
+        "of the images (ffmpeg -vf crop)",
+        field_deg, equidistant_px, plumb_bob_px, least_field_deg);
+  } catch (const cv::Exception&) {  // of uninformative views
+    return {};
+  }
+}
+
 // By the corners alone, to start with: OpenCV's, without k3 and what else an adjustment finds.
 std::optional<CameraAdjustment> first_fit(const Board& board, const std::vector<BoardView>& views,
                                           const Camera& start) {
-  std::vector<std::vector<cv::Point3f>> on_board;
-  std::vector<std::vector<cv::Point2f>> in_picture;
-  for (const BoardView& view : views) {
-    Points points = points_of(board, view.corners);
-    on_board.push_back(std::move(points.on_board)), in_picture.push_back(std::move(points.in_picture));
-  }
+  const AllPoints all(board, views);
   cv::Mat matrix, distortion;
   std::vector<cv::Mat> rotations, translations;
   CameraAdjustment fit;
   fit.camera = start;
   fit.camera.width_px = views.front().bgr.cols, fit.camera.height_px = views.front().bgr.rows;
   try {
-    cv::calibrateCamera(on_board, in_picture, views.front().bgr.size(), matrix, distortion, rotations, translations,
-                        cv::CALIB_FIX_K3);
+    cv::calibrateCamera(all.on_board, all.in_picture, views.front().bgr.size(), matrix, distortion, rotations,
+                        translations, cv::CALIB_FIX_K3);
   } catch (const cv::Exception&) {  // of uninformative views
     return std::nullopt;
   }
@@ -293,6 +326,8 @@ CameraCalibration calibrate_camera(const Board& board, const std::vector<BoardVi
   const auto progress = [&](const char* what) { watch.tell(std::nullopt, ++step, fmt::format(", {}", what)); };
   const cv::Size size = views.empty() ? cv::Size() : views.front().bgr.size();
   const auto refuse = [&](const std::string& why) {
+    const std::string lens = views.size() < least_views ? "" : fisheye_text(board, views);
+    if (!lens.empty()) return calibration.refusal = lens, calibration;
     const std::string more = advice(views, size);
     calibration.refusal = why + (more.empty() ? "" : ": " + more);
     return calibration;
@@ -341,9 +376,8 @@ CameraCalibration calibrate_camera(const Board& board, const std::vector<BoardVi
   if (const std::string why = refusal_of(*fit, views); !why.empty()) return refuse(why);
   if (calibration.rms_px > max_rms_px)
     return refuse(fmt::format("edges miss the fit by {:.2f} px rms: {}", calibration.rms_px,
-                              calibration.faults.empty()
-                                  ? "is the board flat, are the images unprocessed and sharp, is it a fisheye"
-                                  : calibration.faults.front()));
+                              calibration.faults.empty() ? "is the board flat, are the images unprocessed and sharp"
+                                                         : calibration.faults.front()));
   if (!is_invertible(calibration.camera))
     return refuse("the distortion that fits the views can't be inverted at the image's border: show the board there");
   return calibration;

@@ -166,6 +166,27 @@ TEST(CalibrateCamera, RefusesViewsThatAreTooFewOrAlike) {
   for (const char* part : {"too alike", "tilt the board", "right"}) EXPECT_TRUE(has(refusal, part));
 }
 
+// By corners alone: the images show none.
+TEST(CalibrateCamera, NamesAFisheyeLens) {
+  const Camera camera = small_camera();
+  for (const bool is_fisheye : {false, true}) {
+    std::vector<BoardView> views;
+    for (Rigid3 pose : board_poses({}, camera, 8, 210)) {
+      BoardView& view = views.emplace_back(BoardView{"", cv::Mat(480, 640, CV_8UC3, cv::Scalar::all(90)), {}});
+      if (is_fisheye) pose.translation.z() *= 0.4;
+      for (int i = 0; i < board.columns * board.rows; ++i) {
+        const int column = i % board.columns, row = i / board.columns;
+        const Eigen::Vector3d m = pose * board.corner_m(column, row);
+        const double across = m.head<2>().norm(), radius_px = 250 * std::atan2(across, m.z());
+        const Eigen::Vector2d px = Eigen::Vector2d(319.5, 239.5) + radius_px / across * m.head<2>();
+        view.corners.push_back({column, row, is_fisheye ? px : camera.raw_from_point(m)});
+      }
+    }
+    const std::string refusal = calibrate_camera(board, views, {}).refusal;
+    EXPECT_EQ(refusal.find("the lens is a fisheye of some 183 degrees") != std::string::npos, is_fisheye) << refusal;
+  }
+}
+
 TEST(CalibrateCamera, ChoosesViewsThatDiffer) {
   const Camera camera = small_camera();
   const auto poses = board_poses({}, camera, 2, 170);
