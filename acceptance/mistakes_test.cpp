@@ -229,7 +229,7 @@ std::vector<Mistake> mistakes() {
        moved_endoscope,
        {check},
        {"the endoscope or the arm's base was moved", "calibrate registration"}},
-      {"squares for inner corners", [] {}, {changed(camera, {{"9x6", "10x7"}})}, {"number of inner corners"}},
+      {"squares for inner corners", [] {}, {changed(camera, {{"9x6", "10x7"}})}, {"--board 9x6"}},
       {"rig edited meanwhile",
        [] {
          in_rig({})();

@@ -51,10 +51,11 @@ class SameRandomNumbers {
   cv::RNG others_ = cv::theRNG();
 };
 
+constexpr int large_px = 800;
+
 std::vector<BoardCorner> find_chessboard(const Board& board, const cv::Mat& grey, bool thorough) {
   // Half of the size first: quick, and noise and sharpening matter less. The corners are measured elsewhere.
   std::vector<cv::Point2f> points;
-  constexpr int large_px = 800;
   const cv::Size size(board.columns, board.rows);
   const auto found_in = [&](const cv::Mat& picture, int flags) {
     return cv::findChessboardCornersSB(picture, size, points, flags);
@@ -216,6 +217,20 @@ std::vector<BoardCorner> find_board(const Board& board, const cv::Mat& bgr, bool
   } catch (const cv::Exception&) {  // of its fits to what is no board
     return {};
   }
+}
+
+std::optional<std::pair<int, int>> size_of_chessboard(const cv::Mat& bgr) {
+  cv::Mat grey, found;
+  cv::cvtColor(bgr, grey, cv::COLOR_BGR2GRAY);
+  if (grey.cols > large_px) cv::resize(grey, grey, {}, 0.5, 0.5, cv::INTER_AREA);
+  const SameRandomNumbers same;
+  try {
+    std::vector<cv::Point2f> points;
+    if (!cv::findChessboardCornersSB(grey, {3, 3}, points, cv::CALIB_CB_LARGER, found)) return std::nullopt;
+  } catch (const cv::Exception&) {  // of its fits to what is no board
+    return std::nullopt;
+  }
+  return std::pair(std::max(found.cols, found.rows), std::min(found.cols, found.rows));
 }
 
 std::pair<double, double> EdgePath::place_of(const Eigen::Vector2d& raw_px) const {

@@ -42,6 +42,10 @@ std::string board_problem(const Board& board);
 /// found turned by 180 degrees: its corners are the same.
 std::vector<BoardCorner> find_board(const Board& board, const cv::Mat& bgr, bool thorough);
 
+/// Columns and rows of inner corners of the chessboard in an image (8-bit BGR), the larger number first; nullopt where
+/// there is none. Takes seconds, throws nothing.
+std::optional<std::pair<int, int>> size_of_chessboard(const cv::Mat& bgr);
+
 /// The edge between two squares, from one inner corner to the next: where a camera would show it.
 struct EdgePath {
   Eigen::Vector3d from_m, to_m;                ///< on the board

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <map>
 #include <system_error>
 #include <utility>
 
@@ -60,7 +61,7 @@ Board board_of(const BoardWords& words, const BoardWords::Names& names) {
 
 BoardRecordings::BoardRecordings(const Board& board, std::size_t most_views, const std::optional<Rig>& rig,
                                  bool deinterlace)
-    : views_(board, most_views), whose_("the rig's camera") {
+    : board_(board), views_(board, most_views), whose_("the rig's camera") {
   if (static_cast<std::size_t>(board.columns * board.rows) < BoardViews::least_corners)
     throw InputError("board", "inner corners", fmt::format("{}x{}", board.columns, board.rows),
                      fmt::format("{} or more to calibrate a camera", BoardViews::least_corners));
@@ -91,7 +92,10 @@ void BoardRecordings::look_at(FrameSource& source, const std::string& name, cons
     const bool searched = pictures || !views_.full();
     if (searched) {
       const cv::Mat bgr = field_ ? field_->of(frame->bgr).clone() : frame->bgr;
-      if (!views_.add(name_of(*frame), bgr, pictures) && pictures) without_board_.push_back(name_of(*frame));
+      if (!views_.add(name_of(*frame), bgr, pictures)) {
+        others_.add([&] { return bgr.clone(); });
+        if (pictures) without_board_.push_back(name_of(*frame));
+      }
     }
     watch.tell(source.frame_count(), read, fmt::format(", {} views", views_.views().size()));
     if (!live) continue;
@@ -105,6 +109,20 @@ void BoardRecordings::look_at(FrameSource& source, const std::string& name, cons
   read_.complaint = read_.stopped ? "" : source.complaint();
 }
 
+std::string BoardRecordings::other_board() const {
+  if (!board_.dictionary.empty()) return "";
+  std::map<std::pair<int, int>, std::size_t> sizes;
+  for (const cv::Mat& bgr : others_.items())
+    if (const auto size = size_of_chessboard(bgr)) ++sizes[*size];
+  for (const auto& [size, images] : sizes)
+    if (2 * images > others_.items().size())
+      return fmt::format(
+          "{} of {} images that were tried show a chessboard of {}x{} inner corners (squares meet at them, the outer "
+          "border has none): --board {}x{}, where it is in view wholly",
+          images, others_.items().size(), size.first, size.second, size.first, size.second);
+  return "";
+}
+
 CameraCalibration measure_camera(const Board& board, BoardRecordings recordings, const Camera& start,
                                  const JobWatch& watch) {
   CameraCalibration calibration;
@@ -112,12 +130,12 @@ CameraCalibration measure_camera(const Board& board, BoardRecordings recordings,
   if (read.stopped) return calibration.refusal = "stopped", calibration;
   std::vector<BoardView> views = recordings.take_views();
   if (views.empty()) {
-    calibration.refusal = read.all_damaged()
-                              ? text_of_damaged(read.damaged, read.damaged)
-                              : fmt::format(
-                                    "the board is in none of {} images{}: look at the board's number of inner "
-                                    "corners, show it wholly, sharp, with a white margin",
-                                    read.looked_at, read.remark_on_damaged());
+    if (read.all_damaged()) return calibration.refusal = text_of_damaged(read.damaged, read.damaged), calibration;
+    const std::string other = recordings.other_board();
+    calibration.refusal = fmt::format(
+        "the board is in none of {} images{}: {}", read.looked_at, read.remark_on_damaged(),
+        other.empty() ? "look at the board's number of inner corners, show it wholly, sharp, with a white margin"
+                      : other);
     return calibration;
   }
   calibration = calibrate_camera(board, views, start, watch);

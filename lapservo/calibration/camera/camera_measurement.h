@@ -8,6 +8,7 @@
 
 #include "lapservo/calibration/camera/camera_calibration.h"
 #include "lapservo/calibration/recording/frame_recording.h"
+#include "lapservo/core/spread.h"
 #include "lapservo/vision/image/interlacing.h"
 
 namespace lapservo::internal {
@@ -44,16 +45,20 @@ class BoardRecordings {
   const std::vector<std::string>& without_board() const { return without_board_; }
   /// Size of the images; nullopt before the first one, where no rig gives it.
   const std::optional<cv::Size>& size() const { return size_; }
+  /// One line on the chessboard of another size that most of some images without the board show; else empty.
+  std::string other_board() const;
   /// Those chosen; empties this.
   std::vector<BoardView> take_views() { return views_.take(); }
 
  private:
+  Board board_;
   BoardViews views_;
   std::optional<EvenField> field_;  // where images are interlaced
   std::optional<cv::Size> size_;
   std::string whose_;
   FramesRead read_;
   std::vector<std::string> without_board_;
+  Spread<cv::Mat> others_{4};  // images without the board
 };
 
 /// Calibrates by what was gathered.

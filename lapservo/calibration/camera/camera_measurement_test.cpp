@@ -61,5 +61,16 @@ TEST(BoardRecordings, LookAtTheEvenFieldOfInterlacedImages) {
   }
 }
 
+// Squares are counted, or a row too many.
+TEST(MeasureCamera, NamesTheBoardThatIsSeen) {
+  const BoardScene scene;
+  const Camera camera = testing::small_test_rig().camera;
+  OneFrame video(render_board(scene, camera, board_poses(scene, camera, 1, 1).front(), 1));
+  BoardRecordings recordings({scene.columns + 1, scene.rows + 1, scene.square_m}, 30, std::nullopt);
+  recordings.look_at(video, "video", {});
+  const std::string refusal = measure_camera({}, std::move(recordings), camera, {}).refusal;
+  EXPECT_NE(refusal.find("--board 9x6"), std::string::npos) << refusal;
+}
+
 }  // namespace
 }  // namespace lapservo::internal
