@@ -247,6 +247,19 @@ std::vector<Figure> figures_of(const CheckedRig& checked) {
   return figures;
 }
 
+std::string encoding_text(const RigFindings& f) {
+  const std::string edges =
+      f.response ? fmt::format(
+                       "channels' edges lie {:.3f} px apart with the rig's response, {:.3f} with the best of the "
+                       "usual ones; {:.3f} and less is good enough",
+                       f.response->before_px, f.response->after_px, rig_limits.response_px)
+                 : "too few edges of channels to compare responses";
+  if (f.response_measured) return edges;
+  return edges +
+         "; the rig's response has no standard deviation and counts as exact, so that psi's sigma lacks its part: "
+         "lapservo calibrate camera measures both";
+}
+
 CheckLines check_lines(const CheckedRig& checked) {
   const RigFindings& f = checked.findings;
   CheckLines lines{{"marker", fmt::format("found in {} of {} frames", f.found, f.frames)}};
@@ -255,11 +268,7 @@ CheckLines check_lines(const CheckedRig& checked) {
                                           "brightest and darkest channel {:.0f}",
                                           f.light->value, 100 * f.light->clipped, f.light->chroma)});
     lines.push_back({"colours", fmt::format("within {:.0f} degrees of the rig's hues", f.hue_error_deg)});
-    if (f.response)
-      lines.push_back(
-          {"encoding", fmt::format("channels' edges lie {:.3f} px apart with the rig's response, {:.3f} with "
-                                   "the best of the usual ones",
-                                   f.response->before_px, f.response->after_px)});
+    lines.push_back({"encoding", encoding_text(f)});
     lines.push_back({"size", fmt::format("the shaft is {:.0f} px wide", f.width_px)});
   } else {
     lines.push_back({"light", fmt::format("the image's values reach {:.0f} of 255, {:.0f} % saturated", f.picture.value,
