@@ -116,14 +116,16 @@ Eigen::VectorXd robust_scales(const Eigen::MatrixXd& residuals) {
   return scales;
 }
 
-// The fit and the window of lags take a part of the scatter away: times its variance.
-double freedom_of(Eigen::Index frames, Eigen::Index numbers, std::size_t alike_frames) {
-  const double taken = static_cast<double>(numbers) + static_cast<double>(alike_frames);
+// The fit, but for what priors hold of its numbers, and the window of lags take a part of the scatter away: times its
+// variance.
+double freedom_of(Eigen::Index frames, double numbers, std::size_t alike_frames) {
+  const double taken = numbers + static_cast<double>(alike_frames);
   return static_cast<double>(frames) / std::max(1.0, static_cast<double>(frames) - taken);
 }
 
 struct Covariances {
   Eigen::MatrixXd scattered, independent;
+  double freedom = 1;
 };
 
 // (sum J'J)^-1 S (sum J'J)^-1 with S that of the frames' gradients and of their neighbours', and (sum J'J)^-1.
@@ -154,20 +156,21 @@ std::optional<Covariances> covariances(const Linearisation& at, const Eigen::Vec
   }
   scatter.diagonal() += priors;
   const Eigen::MatrixXd inverse = units.asDiagonal() * inverse_of_symmetric(normed) * units.asDiagonal();
-  const double freedom = freedom_of(frames, numbers, alike_frames);
-  return Covariances{freedom * product(product(inverse, scatter), inverse), inverse};
+  const double freedom =
+      freedom_of(frames, static_cast<double>(numbers) - priors.dot(inverse.diagonal()), alike_frames);
+  return Covariances{freedom * product(product(inverse, scatter), inverse), inverse, freedom};
 }
 
 // By the numbers that are held.
 Departures departures_at(const Linearisation& at, const Eigen::VectorXd& weights, std::size_t alike_frames,
-                         const Eigen::VectorXd& alike) {
+                         double freedom, const Eigen::VectorXd& alike) {
   const Eigen::Index channels = at.residuals.rows(), frames = at.residuals.cols(), numbers = at.x.size(),
                      rows = channels * frames;
   const double scale = loss_scale(channels);
   LinearFit fit;
   fit.residuals = Eigen::VectorXd::Zero(rows + numbers);
   fit.alike_groups = alike_frames, fit.unmodelled_sigmas = unmodelled_sigmas;
-  fit.freedom = freedom_of(frames, numbers, alike_frames);
+  fit.freedom = freedom;
   Eigen::MatrixXd jacobian(rows + numbers, numbers), weighed(channels, frames);
   for (Eigen::Index i = 0; i < frames; ++i) {
     const Eigen::VectorXd residual = weights.cwiseProduct(at.residuals.col(i));
@@ -214,8 +217,9 @@ std::optional<FrameFit> fit_frames(const FrameResiduals& residuals, const std::v
   }
   const auto sigma = covariances(at, scales.cwiseInverse(), alike_frames);
   if (!sigma || !sigma->scattered.allFinite() || !sigma->independent.allFinite()) return std::nullopt;
-  return FrameFit{at.x,         sigma->scattered, sigma->independent,
-                  at.residuals, scales,           departures_at(at, scales.cwiseInverse(), alike_frames, alike)};
+  return FrameFit{
+      at.x,         sigma->scattered, sigma->independent,
+      at.residuals, scales,           departures_at(at, scales.cwiseInverse(), alike_frames, sigma->freedom, alike)};
 }
 
 }  // namespace lapservo::internal

@@ -19,15 +19,19 @@
 namespace lapservo::internal {
 namespace {
 
-// Something that a fit leaves out: it moves the points, camera frame.
+// Something that a fit leaves out: it moves the points, camera frame, or the tip in the frame of the last joint.
 struct TipFault {
   std::string what, remedy;
   std::vector<Eigen::Matrix3Xd> moves;  // a matrix a component, of a size of 1 m at the tip; a column a sighting
+  bool is_of_tip = false;               // instead: three components, for a wrist that is bent differently
+  double prior_m = 0;                   // standard deviation of a component's size beforehand; 0: nothing is known
 };
 
 // One way to measure a tip, beside its sightings.
 struct TipWay {
   std::vector<TipFault> faults;
+  std::optional<TipFault> wander;   // of the points: slow, of no cause
+  std::optional<TipFault> other;    // beside `faults`, where the points miss by far
   double sigma_point_m = 0;         // of each point by itself
   double unmodelled_sigmas = 1;     // times what scatters, see frame_fit.h
   std::size_t alike_sightings = 1;  // over so many errors are alike
@@ -126,9 +130,15 @@ class TipModel {
     common_ = add_block(unknowns_, common_errors(sightings));
     if (!sightings.front().point_in_camera_m)
       dimple_ = add_block(unknowns_, {{start_m[3], step_m}, {start_m[4], step_m}, {start_m[5], step_m}});
+    std::vector<Unknown> sizes;
     for (const TipFault& fault : way.faults)
-      for (const Eigen::Matrix3Xd& moves : fault.moves) moves_.push_back(&moves);
-    faults_ = add_block(unknowns_, std::vector<Unknown>(moves_.size(), {0, step_m}));
+      for (const Eigen::Matrix3Xd& moves : fault.moves)
+        moves_.push_back(&moves), sizes.push_back({0, step_m, fault.prior_m});
+    faults_ = add_block(unknowns_, sizes);
+    if (std::ranges::any_of(way.faults, &TipFault::is_of_tip) && is_bent_) {
+      tip_ = add_block(unknowns_, std::vector<Unknown>(3, {0, step_m}));
+      faults_.size += 3;
+    }
   }
 
   const std::vector<Unknown>& unknowns() const { return unknowns_; }
@@ -151,7 +161,8 @@ class TipModel {
                           arm_m = sighting.pose.marker.camera_from_marker.rotation * tip_m(x, sighting.wrist_rad);
     const Eigen::Quaterniond turn = rotation_by(common[1] * hinge_of(sighting.pose) + common[2] * sighting.pose.axis());
     Eigen::Vector3d point_m = dimple_.size > 0 ? Eigen::Vector3d(dimple_.of(x)) : *sighting.point_in_camera_m;
-    for (Eigen::Index k = faults_.first; k < x.size(); ++k)
+    const Eigen::Index moves_end = faults_.first + static_cast<Eigen::Index>(moves_.size());
+    for (Eigen::Index k = faults_.first; k < std::min(moves_end, x.size()); ++k)
       if (x[k] != 0)
         point_m += x[k] * moves_[static_cast<std::size_t>(k - faults_.first)]->col(static_cast<Eigen::Index>(i));
     return (1 + common[0]) * sighting.pose.origin() + turn * arm_m - point_m;
@@ -170,6 +181,7 @@ class TipModel {
     Tool tool = tool_;
     tool.place = Tool::Place{x.head<3>(), wrap_pi(x[3])};
     for (std::size_t i = 0; i < tool.wrist.size(); ++i) tool.wrist[i].offset_rad = x[4 + static_cast<Eigen::Index>(i)];
+    if (tip_.size > 0 && x.size() > tip_.first) tool.last_from_tip.translation += tip_.of(x);
     return tool;
   }
 
@@ -200,7 +212,7 @@ class TipModel {
   std::vector<Eigen::Matrix3d> in_sigmas_;
   std::vector<const Eigen::Matrix3Xd*> moves_;  // of the faults' components
   std::vector<Unknown> unknowns_;
-  Block place_, common_, dimple_, faults_;
+  Block place_, common_, dimple_, faults_, tip_;  // tip_: the last of the faults
 };
 
 struct ModelFit {
@@ -232,20 +244,57 @@ struct Explanation {
   std::string text{};
 };
 
+std::string text_of(const TipFault& fault, double size_m) {
+  return fmt::format("{} by {:.2g} mm: {}", fault.what, 1e3 * size_m, fault.remedy);
+}
+
 // The fault that leaves least of a misfit.
 Explanation explaining_fault(const Tool& tool, const std::vector<TipSighting>& sightings, const TipWay& way,
-                             const FrameFit& without) {
+                             const FrameFit& without, bool miss_by_far) {
   constexpr double least_gain = 0.9;
   Explanation best{least_gain * left_by(without)};
-  for (const TipFault& fault : way.faults) {
+  std::vector<TipFault> faults = way.faults;
+  if (miss_by_far && way.other) faults.push_back(*way.other);
+  for (const TipFault& fault : faults) {
     TipWay with = way;
     with.faults = {fault};
     const auto fitted = best_fit(tool, sightings, with, true);
-    if (!fitted || left_by(fitted->fit) > best.left) continue;
-    const double size_m = fitted->model.faults().of(fitted->fit.x).norm();
-    best = {left_by(fitted->fit), size_m, fmt::format("{} by {:.2g} mm: {}", fault.what, 1e3 * size_m, fault.remedy)};
+    if (!fitted || fitted->model.faults().size == 0 || left_by(fitted->fit) > best.left) continue;
+    const Eigen::VectorXd sizes_m = fitted->model.faults().of(fitted->fit.x);
+    std::string tip_key;
+    if (fault.is_of_tip) {
+      const Eigen::Vector3d tip_m = (1e4 * (tool.last_from_tip.translation + sizes_m)).array().round() / 1e4 + 0.0;
+      tip_key = fmt::format(" tip_in_last_joint_m: [{:g}, {:g}, {:g}]", tip_m.x(), tip_m.y(), tip_m.z());
+    }
+    best = {left_by(fitted->fit), sizes_m.norm(), text_of(fault, sizes_m.norm()) + tip_key};
   }
   return best;
+}
+
+struct WanderingFit {
+  FrameFit fit;
+  double wander_m;  // rms of a component
+};
+
+// Beside points that wander as far as the residuals say (MacKay 1992): what goes with the motion as slowly as a wander
+// does, the tip is known that much worse by. Nullopt where they say no more than least_fault_m.
+std::optional<WanderingFit> wandering_fit(const Tool& tool, const std::vector<TipSighting>& sightings, TipWay way) {
+  constexpr double settled = 0.2;
+  constexpr int rounds = 4;
+  if (!way.wander) return std::nullopt;
+  way.faults = {*way.wander};
+  double& prior_m = way.faults.front().prior_m = least_fault_m;
+  for (int round = 1;; ++round) {
+    auto fitted = best_fit(tool, sightings, way, true);
+    if (!fitted) return std::nullopt;
+    const Block& sizes = fitted->model.faults();
+    const double known = (1 - sizes.of(fitted->fit.independent).diagonal().array() / (prior_m * prior_m)).sum();
+    const double next_m = sizes.of(fitted->fit.x).norm() / std::sqrt(std::max(known, 1e-9));
+    if (next_m < least_fault_m) return std::nullopt;
+    if (round == rounds || std::abs(next_m - prior_m) < settled * prior_m)
+      return WanderingFit{std::move(fitted->fit), next_m};
+    prior_m = next_m;
+  }
 }
 
 bool is_misfit(const TipCalibration& result) {
@@ -278,8 +327,10 @@ TipCalibration fit_tip(const Tool& tool, const std::vector<TipSighting>& sightin
   if (!best) return result.refusal = "the tip is left open: " + way.to_do, result;
   const auto& [model, fit] = *best;
   const double unmodelled = way.unmodelled_sigmas * way.unmodelled_sigmas;
-  result.tool = model.tool_at(fit.x, covariance_at_least(unmodelled * fit.covariance, fit.independent) +
-                                         fit.departures.by_seen + fit.departures.by_instead);
+  const auto wandering = wandering_fit(tool, sightings, way);
+  const FrameFit& beside = wandering ? wandering->fit : fit;
+  result.tool = model.tool_at(beside.x, covariance_at_least(unmodelled * beside.covariance, beside.independent) +
+                                            beside.departures.by_seen + beside.departures.by_instead);
   result.with_offsets = model.is_bent();
   result.noise = fit.scales.maxCoeff();
   for (std::size_t i = 0; i < sightings.size(); ++i) {
@@ -289,7 +340,10 @@ TipCalibration fit_tip(const Tool& tool, const std::vector<TipSighting>& sightin
         std::max(result.sigma_m, std::sqrt(eigenvalues_of_symmetric(tip.of_place.topLeftCorner<3, 3>())[2]));
   }
   Explanation fault{0};
-  if (!fit.departures.seen.empty() || is_misfit(result)) fault = explaining_fault(tool, sightings, way, fit);
+  if (!fit.departures.seen.empty() || is_misfit(result))
+    fault = explaining_fault(tool, sightings, way, fit, is_misfit(result));
+  if (wandering && !(fault.size_m > least_fault_m))
+    fault = {0, wandering->wander_m, text_of(*way.wander, wandering->wander_m)};
   if (fault.size_m > least_fault_m) result.fault = fault.text;
   result.refusal = refusal_of(result, way, fault.size_m);
   return result;
@@ -368,6 +422,17 @@ std::vector<TipFault> possible_faults(const std::vector<TimedPose>& poses) {
   return faults;
 }
 
+// A place of its own at the end of each part of the recording, linear between.
+TipFault wander_of(const std::vector<TimedPose>& poses) {
+  TipFault wander{"the tip wanders in its dimple", "use a deeper dimple, press the tip into it, and record again", {}};
+  for (int k = 0; k <= times; ++k)
+    for (Eigen::Index i = 0; i < 3; ++i)
+      wander.moves.push_back(moves_of(poses, [&](const TimedPose&, double part) -> Eigen::Vector3d {
+        return std::max(0.0, 1 - std::abs(times * part - k)) * Eigen::Vector3d::Unit(i);
+      }));
+  return wander;
+}
+
 constexpr double touch_sigma_m = 0.1e-3;
 constexpr std::size_t least_touches = 5;
 
@@ -384,6 +449,11 @@ std::vector<TipFault> possible_faults(const std::vector<TipSighting>& touches) {
            "measure its squares and the marker's diameter with callipers",
            {points}}};
 }
+
+const TipFault other_point{"the point that touched lies elsewhere on the last joint than the tip,",
+                           "touch with the tip, or give the rig's tool, if its jaw ends there,",
+                           {},
+                           true};
 
 // Azimuth and offsets stay; without a place any azimuth is possible, and offsets are as large as the readings' sigmas.
 Tool::Place place_before(const Tool& tool) {
@@ -415,9 +485,10 @@ TipCalibration pivoted_tip(const Tool& tool, const std::vector<double>& wrist_ra
   } else {
     std::vector<TipSighting> sightings;
     for (const TimedPose& pose : poses) sightings.push_back({pose, wrist_rad});
-    result = fit_tip(tool, sightings,
-                     {possible_faults(poses), 0, usual_unmodelled_sigmas, poses_per_second(poses),
-                      "is it in its dimple all the time, is the wrist held straight, does anything else move", to_do});
+    result = fit_tip(
+        tool, sightings,
+        {possible_faults(poses), wander_of(poses), std::nullopt, 0, usual_unmodelled_sigmas, poses_per_second(poses),
+         "is it in its dimple all the time, is the wrist held straight, does anything else move", to_do});
   }
   return result;
 }
@@ -448,7 +519,7 @@ TipCalibration touched_tip(const Tool& tool, const std::vector<TipSighting>& tou
     return result.refusal = fmt::format("{} touches show the marker, {} are needed", touches.size(), least_touches),
            result;
   result = fit_tip(tool, touches,
-                   {possible_faults(touches), touch_sigma_m, 1, 1,
+                   {possible_faults(touches), std::nullopt, other_point, touch_sigma_m, 1, 1,
                     "is the wrist loose (hold it with its motors on), are the corners the ones that are named",
                     "touch more corners, the shaft tilted and rolled differently"});
   if (result.misses_m.empty()) return result;

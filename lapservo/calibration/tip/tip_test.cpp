@@ -134,17 +134,30 @@ struct Errors {
   }
 };
 
-TEST(PivotedTip, IsFoundAsWellAsItsSigmaSays) {
-  Errors errors;
-  for (std::uint64_t seed = first_seed; seed <= last_seed; ++seed) {
-    const Pivoted recording = pivoted(seed, {});
-    const TipCalibration found = pivoted_tip_of(recording);
-    ASSERT_EQ(found.refusal, "") << seed;
-    EXPECT_EQ(found.fault, "") << seed;
-    errors.add(found.tool.place->base_in_marker_m - recording.tip_in_marker_m,
-               found.tool.place->covariance.topLeftCorner<3, 3>());
+// As far as it may lie from the middle of a wide dimple while the shaft turns.
+std::function<Eigen::Vector3d(double)> wander(std::uint64_t seed, double play_m) {
+  Random random(1000 + seed);
+  Eigen::Vector3d pace, phase;
+  for (Eigen::Index i = 0; i < 3; ++i) pace[i] = random.uniform(0.2, 0.9), phase[i] = random.uniform(0, two_pi);
+  return [=](double t) -> Eigen::Vector3d {
+    return play_m * Eigen::Array3d(0.4, 0.4, 0.15) * (pace * t + phase).array().sin();
+  };
+}
+
+TEST(PivotedTip, IsFoundAsWellAsItsSigmaSaysThoughItWanders) {
+  for (const double play_m : {0.0, 0.4e-3}) {
+    Errors errors;
+    for (std::uint64_t seed = first_seed; seed <= last_seed; ++seed) {
+      const Pivoted recording = pivoted(seed, {.slip_m = wander(seed, play_m)});
+      const TipCalibration found = pivoted_tip_of(recording);
+      if (play_m == 0) EXPECT_EQ(found.refusal + found.fault, "") << seed;
+      if (found.refusal.empty())
+        errors.add(found.tool.place->base_in_marker_m - recording.tip_in_marker_m,
+                   found.tool.place->covariance.topLeftCorner<3, 3>());
+    }
+    EXPECT_GT(errors.mm.size(), 30) << play_m;
+    errors.expect(play_m == 0 ? 0.1 : 0.2);
   }
-  errors.expect(0.1);
 }
 
 void expect_refused(const Pivoting& pivoting, const std::string& cause) {
@@ -229,25 +242,14 @@ TEST(TouchedTip, IsFoundAsWellAsItsSigmaSays) {
   straight.expect(0.15);
 }
 
-// The readings of the first touch are off: the others have the tip where it is, and the base behind it.
-TEST(TouchedTip, OfAWristThatIsBentAlikeIsPlacedAtTheMeanOfItsReadings) {
-  for (std::uint64_t seed = first_seed; seed <= last_seed; ++seed) {
-    Touched recording = touched(seed, needle_driver(), 10, 0);
-    recording.touches[0].wrist_rad = {-0.05, 0};
-    const TipCalibration found = touched_tip(recording.truth, recording.touches, recording.names);
-    ASSERT_EQ(found.refusal, "") << seed;
-    ASSERT_FALSE(found.with_offsets);
-    const Eigen::Vector3d off_m = found.tool.place->base_in_marker_m - recording.truth.place->base_in_marker_m;
-    EXPECT_LT(off_m.norm(), 0.4e-3) << seed;  // by the readings of the first touch 0.96 mm
-  }
-}
-
+// At the mean of its readings: by those of the first touch the base is off by several sigmas.
 TEST(TouchedTip, CountsHowFarReadingsOfAWristThatIsBentAlikeMoveTheTip) {
   Errors tips;
   for (std::uint64_t seed = first_seed; seed <= last_seed; ++seed) {
     const Touched recording = touched(seed, needle_driver(), 10, 0.04);
     const TipCalibration found = touched_tip(recording.truth, recording.touches, recording.names);
     ASSERT_EQ(found.refusal, "") << seed;
+    ASSERT_FALSE(found.with_offsets);
     tips.add(found.tool.place->base_in_marker_m - recording.truth.place->base_in_marker_m,
              found.tool.place->covariance.topLeftCorner<3, 3>());
   }
@@ -286,6 +288,16 @@ TEST(TouchedTip, IsRefusedWhereATouchIsOfAnotherCornerOrTheBoardMoves) {
     EXPECT_TRUE(has(touched_tip_of(elsewhere).refusal, "touch 3: the tip is")) << seed;
     for (std::size_t i = 0; i < 10; ++i) moved.touches[i].point_in_camera_m->y() += 2e-4 * static_cast<double>(i);
     EXPECT_TRUE(has(touched_tip_of(moved).refusal, "the board moves")) << seed;
+  }
+}
+
+// A tool file that ends on the axis of the last joint, and a jaw that touches.
+TEST(TouchedTip, IsRefusedWhereAnotherPointOfTheLastJointTouched) {
+  for (const std::uint64_t seed : {1, 2}) {
+    Touched recording = touched(seed, needle_driver(), 10, 0.8);
+    recording.truth.last_from_tip.translation.setZero();
+    const std::string refusal = touched_tip_of(recording).refusal;
+    EXPECT_TRUE(has(refusal, "than the tip, by 10 mm") && has(refusal, "tip_in_last_joint_m: [")) << seed << refusal;
   }
 }
 
