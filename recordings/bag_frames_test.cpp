@@ -182,4 +182,3 @@ TEST(BagJoints, OfTwoArmsOnOneTopicAreRefused) {
     EXPECT_EQ(error.find("two arms publish there") != std::string::npos, other > 0) << error;
   }
 }
-
