@@ -168,8 +168,6 @@ TEST(BagJoints, ThatCanNotBeUsedAreRefused) {
   }
 }
 
-}  // namespace
-}  // namespace lapservo::internal
 TEST(BagJoints, OfTwoArmsOnOneTopicAreRefused) {
   std::vector<JointMessage> readings;
   for (const double other : {0.0, 0.02}) {
@@ -182,3 +180,6 @@ TEST(BagJoints, OfTwoArmsOnOneTopicAreRefused) {
     EXPECT_EQ(error.find("two arms publish there") != std::string::npos, other > 0) << error;
   }
 }
+
+}  // namespace
+}  // namespace lapservo::internal
