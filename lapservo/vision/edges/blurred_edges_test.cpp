@@ -1,5 +1,6 @@
 #include "lapservo/vision/edges/blurred_edges.h"
 
+#include <cmath>
 #include <numbers>
 
 #include <gtest/gtest.h>
