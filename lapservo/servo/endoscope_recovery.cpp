@@ -108,16 +108,12 @@ std::optional<Explanation> EndoscopeRecovery::wrong_rig() const {
 
 // Without a marker there would be nothing to measure with.
 void EndoscopeRecovery::watch(Watching& watching, const ImageMeasurement& image, VisualController& controller) {
-  const Eigen::Vector4d& before = watching.offsets.empty() ? trusted_ : watching.offsets.back().q;
+  const Eigen::Vector4d before = watching.offsets.empty() ? trusted_ : watching.offsets.back().seen.offset;
   seen_joints_ =
       image.camera_from_marker ? seen_joints(rig_.camera, instrument(), sighting(image), before) : std::nullopt;
   const bool moves = stepped(image, controller.delay_is_known());
-  // A registration that is a little wrong misfits from the start, by more and less as the arm moves.
-  const double agreed_rad = watching.offsets.empty() ? 0 : watching.offsets.front().misfit_rad;
-  const double most_misfit_rad = std::max(moves ? moving_misfit_rad : plain_misfit_rad, 2 * agreed_rad);
   const bool contradicts =
-      seen_joints_ && (seen_joints_->misfit_rad > most_misfit_rad ||
-                       ((seen_joints_->offset - before).head<3>().cwiseAbs().array() > max_jump.array()).any());
+      seen_joints_ && (misfits(watching, moves) || jumps(before, controller.config().observer.max_offset));
   watching.contradicting = contradicts ? watching.contradicting + 1 : 0;
   if (!contradicts && !moves) return drop_suspicion(controller);
   if (agreeing_ < agreed_after) return;
@@ -125,6 +121,19 @@ void EndoscopeRecovery::watch(Watching& watching, const ImageMeasurement& image,
     return blames_rig(controller, Blame::any) ? void() : notice(watching.offsets, controller);
   watching.suspects = true;
   controller.suspend(HoldReason::endoscope_moved);
+}
+
+// A registration that is a little wrong misfits from the start, by more and less as the arm moves.
+bool EndoscopeRecovery::misfits(const Watching& watching, bool moves) const {
+  const SeenJoints agreed = watching.offsets.empty() ? SeenJoints{} : watching.offsets.front().seen;
+  const double least_rad = std::max(moves ? moving_misfit_rad : plain_misfit_rad, 2 * agreed.misfit_rad);
+  return seen_joints_->misfit_rad > std::max(least_rad, largest_misfit_rad(instrument(), agreed, *seen_joints_));
+}
+
+// Since the image before, or farther from the joints than the loop's own offset can go.
+bool EndoscopeRecovery::jumps(const Eigen::Vector4d& before, const Eigen::Vector4d& max_offset) const {
+  const Eigen::Vector4d beyond = seen_joints_->offset.cwiseAbs() - max_offset;
+  return ((seen_joints_->offset - before).cwiseAbs().cwiseMax(beyond).head<3>().array() > max_jump.array()).any();
 }
 
 void EndoscopeRecovery::drop_suspicion(VisualController& controller) {
@@ -197,8 +206,8 @@ void EndoscopeRecovery::trust(Watching& watching, const ServoInput& input, const
   if (!image || !image->found || !image->q || step.action != ControlAction::track || !step.estimate || !measured_)
     return;
   agreeing_ = std::min(agreeing_ + 1, agreed_after);
-  watching.offsets.push_back({input.time_s, step.estimate->q - input.joints.q.vector(), *measured_,
-                              seen_joints_ ? seen_joints_->misfit_rad : 0});
+  const Eigen::Vector4d offset = step.estimate->q - input.joints.q.vector();
+  watching.offsets.push_back({input.time_s, offset, *measured_, seen_joints_.value_or(SeenJoints{offset})});
   while (input.time_s - watching.offsets.front().time_s > offset_memory_s) watching.offsets.pop_front();
 }
 

@@ -30,7 +30,7 @@ struct Offset {
   double time_s = 0;
   Eigen::Vector4d q = Eigen::Vector4d::Zero();  ///< of the instrument from the measured joints
   Measured measured;
-  double misfit_rad = 0;  ///< SeenJoints'
+  SeenJoints seen;
 };
 using Sightings = std::vector<MarkerSighting>;
 
@@ -84,6 +84,8 @@ class EndoscopeRecovery {
   bool blames_rig(VisualController& controller, Blame wanted);
   bool stepped(const ImageMeasurement& image, bool delay_is_known);
   void watch(endoscope::Watching& watching, const ImageMeasurement& image, VisualController& controller);
+  bool misfits(const endoscope::Watching& watching, bool moves) const;
+  bool jumps(const Eigen::Vector4d& before, const Eigen::Vector4d& max_offset) const;
   void notice(const std::deque<endoscope::Offset>& offsets, VisualController& controller);
   void drop_suspicion(VisualController& controller);
   void trust_before(const std::deque<endoscope::Offset>& offsets);

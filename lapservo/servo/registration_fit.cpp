@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 
 #include "lapservo/core/dense_matrix.h"
 #include "lapservo/geometry/rotation.h"
 #include "lapservo/kinematics/centre_line.h"
 #include "lapservo/kinematics/rcm_kinematics.h"
+#include "lapservo/rig/registration_covariance.h"
 
 namespace lapservo::internal {
 namespace {
@@ -62,6 +64,12 @@ Eigen::Matrix<double, 6, 6> whitening_by_edges(const Camera& camera, const Marke
   return factor.matrixQR().topRows<6>().triangularView<Eigen::Upper>();
 }
 
+Eigen::Matrix3d symmetric_root(const Eigen::Matrix3d& matrix) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> parts(matrix);
+  return parts.eigenvectors() * parts.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal() *
+         parts.eigenvectors().transpose();
+}
+
 // Where the sighting alone puts the RCM frame.
 Rigid3 camera_from_rcm_by(const Marker& marker, const MarkerSighting& sighting) {
   const auto q = JointVector::from_vector(sighting.q);
@@ -76,23 +84,39 @@ std::optional<SeenJoints> seen_joints(const Camera& camera, const Instrument& in
   constexpr double step = 1e-6;
   const Eigen::Matrix<double, 6, 6> whitening =
       whitening_by_edges(camera, instrument.marker, sighting.camera_from_marker);
-  const auto errors = [&](const Eigen::Vector4d& at) -> Eigen::Matrix<double, 6, 1> {
+  const auto errors = [&](const Eigen::Vector4d& at,
+                          const Eigen::Vector3d& rcm_by_m = Eigen::Vector3d::Zero()) -> Eigen::Matrix<double, 6, 1> {
     const auto q = JointVector::from_vector(sighting.q + at);
-    const Rigid3 unrolled = *instrument.camera_from_rcm * rcm_from_unrolled(q);
+    Rigid3 unrolled = *instrument.camera_from_rcm * rcm_from_unrolled(q);
+    unrolled.translation += rcm_by_m;
     return whitening *
            pose_difference(camera_from_marker(instrument.marker, unrolled, q.psi_rad), sighting.camera_from_marker);
   };
   SeenJoints seen{offset};
+  const double rad = sigma_px / camera.fx_px;
   Eigen::Matrix<double, 6, 4> slopes;
   for (int i = 0; i < iterations; ++i) {
     const Eigen::Matrix<double, 6, 1> at = errors(seen.offset);
     for (int k = 0; k < 4; ++k) slopes.col(k) = (errors(seen.offset + step * Eigen::Vector4d::Unit(k)) - at) / step;
     seen.covariance = inverse_of_symmetric(slopes.transpose() * slopes);
     seen.offset -= seen.covariance * slopes.transpose() * at;
-    seen.misfit_rad = sigma_px / camera.fx_px * (at - slopes * (seen.covariance * slopes.transpose() * at)).norm();
+    seen.misfit_rad = rad * (at - slopes * (seen.covariance * slopes.transpose() * at)).norm();
   }
   if (!seen.offset.allFinite() || !seen.covariance.allFinite()) return std::nullopt;
+  const Eigen::Matrix<double, 6, 1> at = errors(seen.offset);
+  Eigen::Matrix<double, 6, 3> by_rcm;
+  for (int k = 0; k < 3; ++k) by_rcm.col(k) = (errors(seen.offset, step * Eigen::Vector3d::Unit(k)) - at) / step;
+  const Eigen::Matrix<double, 6, 3> left = by_rcm - slopes * (seen.covariance * (slopes.transpose() * by_rcm));
+  seen.misfit_per_m = rad * symmetric_root(left.transpose() * left);
   return seen;
+}
+
+double largest_misfit_rad(const Instrument& instrument, const SeenJoints& agreed, const SeenJoints& here) {
+  constexpr double sigmas = 3, unknown_m = 3e-3;
+  Eigen::Matrix3d covariance = registration_covariance(instrument).topLeftCorner<3, 3>();
+  if (covariance.isZero()) covariance = unknown_m * unknown_m / 3 * Eigen::Matrix3d::Identity();
+  const Eigen::Matrix3d change = here.misfit_per_m - agreed.misfit_per_m;
+  return agreed.misfit_rad + sigmas * std::sqrt((change * covariance * change).trace());
 }
 
 std::optional<RegistrationFit> fit_registration(const Camera& camera, const Marker& marker,

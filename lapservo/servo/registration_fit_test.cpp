@@ -58,6 +58,32 @@ TEST(SeenJoints, MisfitWhereTheShaftMissesTheRcm) {
   EXPECT_GT(last_rad, 5e-4);
 }
 
+// Three sigmas of a root of a sum of three squares: at most 3 % are beyond.
+TEST(SeenJoints, MisfitByNoMoreThanTheRegistrationsSigmasExplain) {
+  constexpr int trials = 200;
+  constexpr double sigma_m = 1e-3;
+  Instrument instrument = rig().instruments[0];
+  instrument.registration_covariance.emplace().setZero();
+  instrument.registration_covariance->diagonal().head<3>().setConstant(sigma_m * sigma_m);
+  Random random(3);
+  int beyond = 0, below_a_tenth = 0;
+  for (int i = 0; i < trials; ++i) {
+    Rigid3 truth = *instrument.camera_from_rcm;
+    truth.translation += sigma_m * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
+    const auto seen_at = [&](double time_s) {
+      const MarkerSighting sighting = sighting_at(time_s, truth, Eigen::Vector4d::Zero(), 0);
+      return seen_joints(rig().camera, instrument, sighting, Eigen::Vector4d::Zero()).value();
+    };
+    const SeenJoints agreed = seen_at(random.uniform(0, 100)), here = seen_at(random.uniform(0, 100));
+    const double largest_rad = largest_misfit_rad(instrument, agreed, here);
+    beyond += here.misfit_rad > largest_rad;
+    below_a_tenth += here.misfit_rad < 0.1 * largest_rad;
+    EXPECT_NEAR(largest_misfit_rad(instrument, agreed, agreed), agreed.misfit_rad, 1e-12);
+  }
+  EXPECT_LE(beyond, 0.03 * trials);
+  EXPECT_LE(below_a_tenth, 0.2 * trials);
+}
+
 TEST(RegistrationFit, IsWhereTheSightingsWereTaken) {
   const Instrument& instrument = rig().instruments[0];
   Random random(2);

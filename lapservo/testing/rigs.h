@@ -26,11 +26,11 @@ inline Eigen::Vector3d random_direction(internal::Random& random) {
   return Eigen::Vector3d(random.normal(), random.normal(), random.normal()).normalized();
 }
 
-/// The first instrument's registration off by 1 mm and 5 mrad.
-inline Rig misregistered(Rig rig, internal::Random& random) {
+/// The first instrument's registration off by 1 mm and 5 mrad, times the scale.
+inline Rig misregistered(Rig rig, internal::Random& random, double scale = 1) {
   Rigid3& camera_from_rcm = *rig.instruments[0].camera_from_rcm;
-  camera_from_rcm.translation += 1e-3 * random_direction(random);
-  camera_from_rcm.rotation = internal::rotation_by(5e-3 * random_direction(random)) * camera_from_rcm.rotation;
+  camera_from_rcm.translation += scale * 1e-3 * random_direction(random);
+  camera_from_rcm.rotation = internal::rotation_by(scale * 5e-3 * random_direction(random)) * camera_from_rcm.rotation;
   return rig;
 }
 
