@@ -57,6 +57,10 @@ void fields(auto& each, auto& wire, Is<StringMessage> auto& message) {
   each(wire.string, message.text);
 }
 
+void fields(auto& each, auto& wire, Is<TextMessage> auto& message) {
+  each(wire.data, message.text);
+}
+
 void fields(auto& each, auto& wire, Is<JoyMessage> auto& message) {
   each.header(wire.header, message.stamp_s);
   each(wire.buttons, message.buttons);

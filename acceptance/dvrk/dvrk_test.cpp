@@ -41,17 +41,6 @@
 #include "lapservo/testing/wait_for.h"
 #include "transports/named_transport.h"
 #include "transports/test_master.h"
-#ifdef LAPSERVO_ROS1
-#include <ros/ros.h>
-#include <std_msgs/String.h>
-
-#include "transports/ros1/ros1_messages.h"
-#endif
-#ifdef LAPSERVO_ROS2
-#include "ros2_messages.h"
-#include "transports/ros2/dds_node.h"
-#include "transports/ros2/ros2_names.h"
-#endif
 
 namespace lapservo::internal {
 namespace {
@@ -325,31 +314,6 @@ class Spy {
   Transport::Subscription subscription_;
 };
 
-// Publishes std_msgs/String, which no port of lapservo has.
-std::function<void(const std::string&)> text_publisher([[maybe_unused]] const std::string& wire,
-                                                       [[maybe_unused]] const std::string& topic) {
-#ifdef LAPSERVO_ROS1
-  using Text = std_msgs::String_<Ros1Allocator<std::byte>>;
-  if (wire == "ros1")
-    return
-        [node = ros::NodeHandle(), publisher = ros::NodeHandle().advertise<Text>(topic, 1)](const std::string& text) {
-          Text message;
-          message.data = text;
-          publisher.publish(message);
-        };
-#endif
-#ifdef LAPSERVO_ROS2
-  const auto node = std::make_shared<DdsNode>("tool_changer", domain_id(std::getenv("ROS_DOMAIN_ID")));
-  const dds_entity_t writer = node->create_writer(topic, std_msgs_msg_dds__String__desc, Delivery::reliable);
-  return [node, writer](std::string text) {
-    const std_msgs_msg_dds__String_ message{text.data()};
-    dds_write(writer, &message);
-  };
-#else
-  return {};
-#endif
-}
-
 // By the wire: dVRK 2.3 over ROS 1, dVRK 2.4 over ROS 2.
 class Dvrk : public ::testing::TestWithParam<std::string> {
  protected:
@@ -373,7 +337,7 @@ class Dvrk : public ::testing::TestWithParam<std::string> {
     servo_cp_ = transport_->publisher<PlaceMessage>("/PSM1/servo_cp");
     set_base_frame_ = transport_->publisher<PlaceMessage>("/PSM1/set_base_frame");
     ecm_servo_jp_ = transport_->publisher<JointMessage>("/ECM/servo_jp");
-    set_tool_type_ = text_publisher(GetParam(), "/PSM1/set_tool_type");
+    set_tool_type_ = transport_->publisher<TextMessage>("/PSM1/set_tool_type");
     command_ = transport_->publisher<StringMessage>("/lapservo/PSM1/command");
     wish_ = transport_->publisher<JointMessage>("/lapservo/PSM1/set_point");
     rig_ = testing::small_test_rig();
@@ -457,7 +421,7 @@ class Dvrk : public ::testing::TestWithParam<std::string> {
   }
   // A simulated arm has none before.
   void set_tool(const std::string& name) {
-    set_tool_type_(name);
+    set_tool_type_({name});
     until("a tool", [&] { return judge_->has_tool() && judge_->is("ENABLED"); });
   }
   void begin_move(const SixJoints& goal) { move_jp_({since_1970_s(), {}, {goal.data(), goal.data() + 6}}); }
@@ -616,7 +580,7 @@ class Dvrk : public ::testing::TestWithParam<std::string> {
   Transport::Publisher<StringMessage> state_command_, command_;
   Transport::Publisher<JointMessage> move_jp_, servo_jp_, ecm_servo_jp_, wish_;
   Transport::Publisher<PlaceMessage> servo_cp_, set_base_frame_;
-  std::function<void(const std::string&)> set_tool_type_;
+  Transport::Publisher<TextMessage> set_tool_type_;
   Rig rig_;
   std::unique_ptr<EndoscopeOfTheArm> endoscope_;
   std::unique_ptr<testing::Process> console_, servo_;

@@ -26,6 +26,12 @@ struct Unanswered {
   double slope = 0;        ///< the image's motion per measured motion: 0 at rest, below 0 the other way
 };
 
+/// A limit of the arm's place: of a joint, or of an end of the marker in the image window.
+struct PositionLimit {
+  Eigen::Index of = 0;  ///< theta, phi, rho, psi; u and v of e0; u and v of e3
+  bool upper = false;
+};
+
 /// The command of the coming period.
 struct ControlStep {
   ControlAction action = ControlAction::hold;
@@ -39,6 +45,7 @@ struct ControlStep {
   double delay_s = 0;                               ///< delay of the image by which the step goes
   bool delay_is_known = false;                      ///< given or estimated: else a first guess
   std::optional<Unanswered> unanswered{};           ///< with HoldReason::image_not_following
+  std::optional<PositionLimit> stops_at{};          ///< with HoldReason::goal_beyond_limit
 };
 
 }  // namespace lapservo

@@ -28,6 +28,7 @@ enum class HoldReason {
   delay_not_found,      ///< after ample motion images and joints agree at no delay: until a start
   tip_open,             ///< the tool, bent as it is, leaves the tip open by more than a goal of the tip allows
   tip_unreachable,      ///< no configuration in view holds the tip at its goal, as wrist and camera are
+  goal_beyond_limit,    ///< the goal stands, and a limit keeps the arm from it: ControlStep::stops_at
   not_learnt,           ///< uncalibrated: the probing motion said too little; it is repeated
   bad_time,             ///< time did not advance
   non_finite,           ///< joints, image, desired features or the result hold a NaN or an infinity

@@ -1,8 +1,51 @@
 #include "lapservo/control/motion_limits.h"
 
 #include <algorithm>
+#include <array>
+#include <limits>
+#include <string_view>
+
+#include <fmt/format.h>
+
+#include "lapservo/core/inplace_vector.h"
+#include "lapservo/core/joint_vector.h"
 
 namespace lapservo::internal {
+
+PositionBounds::PositionBounds(const JointLimits& limits, const std::optional<ImageWindow>& window) {
+  lower << limits.lower, Eigen::Vector4d::Constant(-std::numeric_limits<double>::infinity());
+  upper << limits.upper, Eigen::Vector4d::Constant(std::numeric_limits<double>::infinity());
+  if (!window) return;
+  lower.tail<4>() << window->u_min_px, window->v_min_px, window->u_min_px, window->v_min_px;
+  upper.tail<4>() << window->u_max_px, window->v_max_px, window->u_max_px, window->v_max_px;
+}
+
+std::string PositionBounds::text(const PositionLimit& limit) const {
+  constexpr std::array<std::string_view, 4> ends{"e0_u_px", "e0_v_px", "e3_u_px", "e3_v_px"};
+  const double bound = limit.upper ? upper[limit.of] : lower[limit.of];
+  const auto of = static_cast<std::size_t>(limit.of);
+  if (of < 4) return fmt::format("limits.{} {} {:.4g}", limit.upper ? "upper" : "lower", JointVector::names[of], bound);
+  return fmt::format("field of view: {} {} {:.4g}", limit.upper ? "largest" : "least", ends[of - 4], bound);
+}
+
+Stop stop_at(const PositionBounds& bounds, const Scales& scales, const Eigen::Vector4d& position, const EndPoints& ends,
+             const Eigen::Vector4d& wanted, const Eigen::Matrix4d& weight) {
+  constexpr double near = 0.01, near_px = 1;
+  HalfSpaces sides;
+  InplaceVector<PositionLimit, 16> limits;  // of the sides
+  const auto add = [&](Eigen::Index of, const Eigen::Vector4d& normal, double place, double within) {
+    if (bounds.upper[of] - place < within) sides.push_back({normal, 0}), limits.push_back({of, true});
+    if (place - bounds.lower[of] < within) sides.push_back({-normal, 0}), limits.push_back({of, false});
+  };
+  for (Eigen::Index i = 0; i < 4; ++i) {
+    add(i, Eigen::Vector4d::Unit(i), position[i], near * scales.joints[i]);
+    add(4 + i, ends.jacobian.row(i), ends.ends_px[i], near_px);
+  }
+  const QpSolution solution = solve_velocity_qp(weight, wanted, sides, Eigen::Vector4d::Zero());
+  Stop stop{solution.x};
+  if (solution.optimal && solution.constrained) stop.at = limits[solution.strongest];
+  return stop;
+}
 
 double stopping_time_s(const JointLimits& limits) {
   return limits.rate.cwiseQuotient(limits.acceleration).maxCoeff();
@@ -35,8 +78,8 @@ LimitedVelocity limit_velocity(const JointLimits& limits, const std::optional<Im
     bounds.push_back({-Eigen::Vector4d::Unit(i), std::max(low, -braking[i])});
   }
   if (window && ends) {
-    const Eigen::Vector4d lower(window->u_min_px, window->v_min_px, window->u_min_px, window->v_min_px);
-    const Eigen::Vector4d upper(window->u_max_px, window->v_max_px, window->u_max_px, window->v_max_px);
+    const PositionBounds places(limits, window);
+    const Eigen::Vector4d lower = places.lower.tail<4>(), upper = places.upper.tail<4>();
     for (int i = 0; i < 4; ++i) {
       const Eigen::Vector4d row = ends->jacobian.row(i);
       const double speed = row.dot(motion.velocity), least = row.dot(braking);

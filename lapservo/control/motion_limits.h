@@ -1,9 +1,11 @@
 #pragma once
 
 #include <optional>
+#include <string>
 
 #include <Eigen/Core>
 
+#include "lapservo/control/control_step.h"
 #include "lapservo/control/controller_config.h"
 #include "lapservo/control/velocity_qp.h"
 #include "lapservo/robot/joint_path.h"
@@ -15,6 +17,24 @@ struct EndPoints {
   Eigen::Vector4d ends_px = Eigen::Vector4d::Zero();
   Eigen::Matrix4d jacobian = Eigen::Matrix4d::Zero();
 };
+
+/// Bounds of position, by PositionLimit::of; those of the marker's ends are infinite without a window.
+struct PositionBounds {
+  Eigen::Matrix<double, 8, 1> lower, upper;
+  PositionBounds(const JointLimits& limits, const std::optional<ImageWindow>& window);
+  /// "limits.upper rho_m 0.2", "field of view: least e3_v_px 20".
+  std::string text(const PositionLimit& limit) const;
+};
+
+/// The part of a motion that reached bounds allow.
+struct Stop {
+  Eigen::Vector4d left = Eigen::Vector4d::Zero();  ///< of the velocity
+  std::optional<PositionLimit> at{};               ///< the bound that takes most of it; nullopt where none takes any
+};
+/// Bounds are reached within a hundredth of a joint's scale, or a pixel. `left` is nearest to `wanted` in the norm of
+/// `weight`; rates and accelerations do not count.
+Stop stop_at(const PositionBounds& bounds, const Scales& scales, const Eigen::Vector4d& position, const EndPoints& ends,
+             const Eigen::Vector4d& wanted, const Eigen::Matrix4d& weight);
 
 /// Time that stopping never takes longer than: the largest rate / acceleration of a joint.
 double stopping_time_s(const JointLimits& limits);

@@ -1,6 +1,7 @@
 #include "lapservo/control/motion_limits.h"
 
 #include <algorithm>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -81,6 +82,29 @@ TEST(MotionLimits, AreNeverCrossedWhateverIsWanted) {
   }
   EXPECT_GT(touched_window, 1000);
   EXPECT_GT(touched_joints, 1000);
+}
+
+TEST(MotionLimits, NameTheOneThatStopsTheArm) {
+  const PositionBounds bounds(JointLimits(), ImageWindow{20, 1259, 20, 699});
+  const auto stop = [&](const Eigen::Matrix<double, 8, 1>& place, const Eigen::Vector4d& wanted) {
+    return stop_at(bounds, Scales(), place.head<4>(), {place.tail<4>(), Eigen::Matrix4d::Identity()}, wanted,
+                   Eigen::Matrix4d::Identity());
+  };
+  for (Eigen::Index of = 0; of < 8; ++of)
+    for (const bool upper : {false, true}) {
+      Eigen::Matrix<double, 8, 1> place = (bounds.lower + bounds.upper) / 2;
+      const Eigen::Vector4d outward = (upper ? 1 : -1) * Eigen::Vector4d::Unit(of % 4),
+                            along = Eigen::Vector4d::Ones() - outward.cwiseAbs();
+      EXPECT_FALSE(stop(place, outward).at);
+      place[of] = upper ? bounds.upper[of] : bounds.lower[of];
+      const Stop stopped = stop(place, outward + along);
+      ASSERT_TRUE(stopped.at) << of;
+      EXPECT_EQ(std::pair(stopped.at->of, stopped.at->upper), std::pair(of, upper));
+      EXPECT_LT((stopped.left - along).norm(), 1e-12);
+      EXPECT_FALSE(stop(place, along - outward).at) << of;
+    }
+  EXPECT_EQ(bounds.text({2, true}), "limits.upper rho_m 0.2");
+  EXPECT_EQ(bounds.text({7, false}), "field of view: least e3_v_px 20");
 }
 
 TEST(MotionLimits, LetAnArmOutOfRangeComeBackOnly) {

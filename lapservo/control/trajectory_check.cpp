@@ -1,11 +1,10 @@
 #include "lapservo/control/trajectory_check.h"
 
-#include <array>
 #include <cmath>
-#include <string_view>
 
 #include <fmt/format.h>
 
+#include "lapservo/control/motion_limits.h"
 #include "lapservo/control/newton_inverse.h"
 #include "lapservo/control/tracking_law.h"
 #include "lapservo/core/angles.h"
@@ -15,32 +14,24 @@ namespace lapservo {
 using namespace internal;
 namespace {
 
-constexpr std::array<std::string_view, 4> end_names{"e0_u_px", "e0_v_px", "e3_u_px", "e3_v_px"};
-
-std::string bound_text(std::string_view limit, std::string_view name, double bound, double needed) {
-  return fmt::format("{} {} {:.4g}: needs {:.4g}", limit, name, bound, needed);
-}
-
-std::optional<std::string> broken_joint_limit(const JointLimits& limits, const Eigen::Vector4d& q,
-                                              const Eigen::Vector4d& velocity) {
-  constexpr double rounding = 1e-6;  // rad, m: of a place on the limit itself
-  for (int i = 0; i < 4; ++i) {
-    const std::string_view name = JointVector::names[static_cast<std::size_t>(i)];
-    if (q[i] < limits.lower[i] - rounding) return bound_text("limits.lower", name, limits.lower[i], q[i]);
-    if (q[i] > limits.upper[i] + rounding) return bound_text("limits.upper", name, limits.upper[i], q[i]);
-    if (std::abs(velocity[i]) > limits.rate[i]) return bound_text("limits.rate", name, limits.rate[i], velocity[i]);
+std::optional<std::string> broken_bound(const PositionBounds& bounds, const Eigen::Vector4d& q,
+                                        const Eigen::Vector4d& ends_px) {
+  constexpr double rounding = 1e-6;  // rad, m, px: of a place on the limit itself
+  Eigen::Matrix<double, 8, 1> places;
+  places << q, ends_px;
+  for (Eigen::Index i = 0; i < places.size(); ++i) {
+    const bool above = places[i] > bounds.upper[i] + rounding;
+    if (above || places[i] < bounds.lower[i] - rounding)
+      return fmt::format("{}: needs {:.4g}", bounds.text({i, above}), places[i]);
   }
   return std::nullopt;
 }
 
-std::optional<std::string> outside_window(const ImageWindow& window, const Eigen::Vector4d& ends_px) {
-  const Eigen::Vector4d lower(window.u_min_px, window.v_min_px, window.u_min_px, window.v_min_px);
-  const Eigen::Vector4d upper(window.u_max_px, window.v_max_px, window.u_max_px, window.v_max_px);
-  for (int i = 0; i < 4; ++i) {
-    const std::string_view name = end_names[static_cast<std::size_t>(i)];
-    if (ends_px[i] < lower[i]) return bound_text("field of view: least", name, lower[i], ends_px[i]);
-    if (ends_px[i] > upper[i]) return bound_text("field of view: largest", name, upper[i], ends_px[i]);
-  }
+std::optional<std::string> broken_rate(const JointLimits& limits, const Eigen::Vector4d& velocity) {
+  for (Eigen::Index i = 0; i < 4; ++i)
+    if (std::abs(velocity[i]) > limits.rate[i])
+      return fmt::format("limits.rate {} {:.4g}: needs {:.4g}", JointVector::names[static_cast<std::size_t>(i)],
+                         limits.rate[i], velocity[i]);
   return std::nullopt;
 }
 
@@ -56,9 +47,8 @@ std::optional<std::string> broken_limit(const ControllerConfig& config, const Fe
                                         const Eigen::Vector4d& q, const Eigen::Vector4d& rate) {
   const DampedInverse inverse = damped_inverse(state.jacobian, config.scales, config.damping_threshold);
   if (inverse.min_singular_value < config.min_singular_value) return "the Jacobian is singular";
-  if (auto broken = broken_joint_limit(config.limits, q, inverse.inverse * rate)) return broken;
-  if (config.window) return outside_window(*config.window, state.ends_px);
-  return std::nullopt;
+  if (auto broken = broken_bound({config.limits, config.window}, q, state.ends_px)) return broken;
+  return broken_rate(config.limits, inverse.inverse * rate);
 }
 
 std::string Infeasible::text() const {

@@ -31,12 +31,13 @@ QpSolution solve_velocity_qp(const Eigen::Matrix4d& weight, const Eigen::Vector4
                              const Eigen::Vector4d& feasible_start) {
   constexpr int max_iterations = 80;
   const Eigen::LLT<Eigen::Matrix4d> cholesky(weight);
-  // In y = L^T (x - wanted), normals scaled to unit length. A normal that vanishes restricts nothing.
+  // In y = L^T (x - wanted), normals scaled to unit length. A normal that vanishes stays zero and restricts nothing.
   HalfSpaces in_y;
   for (const HalfSpace& limit : limits) {
     const Eigen::Vector4d normal = cholesky.matrixL().solve(limit.normal);
     const double length = normal.norm();
-    if (length > 0) in_y.push_back({normal / length, (limit.bound - limit.normal.dot(wanted)) / length});
+    in_y.push_back(length > 0 ? HalfSpace{normal / length, (limit.bound - limit.normal.dot(wanted)) / length}
+                              : HalfSpace{});
   }
 
   QpSolution solution;
@@ -73,6 +74,8 @@ QpSolution solve_velocity_qp(const Eigen::Matrix4d& weight, const Eigen::Vector4
     for (auto* k = working.begin(); k != working.end(); ++k)
       if (mu[k - working.begin()] > tolerance && (released == working.end() || *k < *released)) released = k;
     solution.optimal = released == working.end();
+    Eigen::Index most = 0;
+    if (mu.size() > 0) mu.minCoeff(&most), solution.strongest = working[static_cast<std::size_t>(most)];
     if (!solution.optimal) std::copy(released + 1, working.end(), released), working.pop_back();
   }
   solution.constrained = !working.empty();

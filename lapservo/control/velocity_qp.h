@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstddef>
+
 #include <Eigen/Core>
 
 #include "lapservo/core/inplace_vector.h"
@@ -19,6 +21,8 @@ struct QpSolution {
   Eigen::Vector4d x = Eigen::Vector4d::Zero();
   bool optimal = false;      ///< else feasible, but the iteration limit was reached
   bool constrained = false;  ///< at least one half-space holds x back
+  std::size_t strongest =
+      0;  ///< the place in `limits` of the one with the largest multiplier, where x is so and optimal
 };
 
 /// Minimises (x - wanted)^T weight (x - wanted) subject to `limits`, from a feasible start; `weight` is symmetric and

@@ -88,6 +88,8 @@ TEST(VelocityQp, IsFeasibleAndOptimal) {
     ASSERT_LE(worst_violation(p, solution.x), 1e-8);
     ASSERT_LE(distance_to_optimality(p, solution.x), 1e-6 * (1 + (p.weight * (p.wanted - solution.x)).norm()));
     constrained += solution.constrained ? 1 : 0;
+    const HalfSpace& side = p.limits[solution.strongest];
+    ASSERT_TRUE(!solution.constrained || side.bound - side.normal.dot(solution.x) < 1e-8 * side.normal.norm());
   }
   EXPECT_GT(constrained, 3000);
 }

@@ -36,6 +36,10 @@ Eigen::Vector4d slow_to_rate(const Eigen::Vector4d& velocity, const Eigen::Vecto
   return times > 1 ? Eigen::Vector4d(velocity / times) : velocity;
 }
 
+EndPoints ends_at(const Estimate& now, const Eigen::Vector4d& ahead) {
+  return {now.ends_px + now.ends_jacobian * ahead, now.ends_jacobian};
+}
+
 }  // namespace
 
 VisualController::VisualController(const ControllerConfig& config, FeatureModel model)
@@ -48,6 +52,7 @@ VisualController::VisualController(const ControllerConfig& config, FeatureModel 
       frozen_image_(config.scales),
       image_response_(config),
       error_growth_(config.scales),
+      limited_goal_(config.scales),
       wild_joints_(config.limits.rate),
       path_(config.limits.acceleration) {}
 
@@ -72,6 +77,7 @@ void VisualController::start_over(double time_s, const Eigen::Vector4d& q_joint)
 void VisualController::restart_tests() {
   image_response_.restart();
   error_growth_.restart();
+  limited_goal_.restart();
   estimator_->restart_tests();
   until_start_ = HoldReason::none;
 }
@@ -80,6 +86,7 @@ void VisualController::resume(const FeatureModel& model) {
   resume();
   image_response_.interrupt();
   error_growth_.restart();
+  limited_goal_.restart();
   estimator_->set_model(model);
   image_reason_ = HoldReason::no_image_yet;
 }
@@ -104,6 +111,10 @@ ControlStep VisualController::step(double time_s, const Eigen::Vector4d& q_joint
   const Law law = decide(step.reason, step.estimate, desired);
   step.reason = law.reason;
   step.velocity = brake(config_.limits, path_.at(now_s_).velocity, config_.period_s);
+  if (step.estimate && all_finite(desired)) step.error = feature_error(step.estimate->features, desired.features);
+  if (step.reason == HoldReason::none && law.action == ControlAction::track && follows_)
+    step.stops_at = stops_at(law, q_joint, desired, step);
+  if (step.stops_at) step.reason = HoldReason::goal_beyond_limit;
   if (step.reason == HoldReason::none) {
     limit(law, q_joint, step);
   } else if (measured_) {
@@ -115,7 +126,6 @@ ControlStep VisualController::step(double time_s, const Eigen::Vector4d& q_joint
   if (timed && started_) path_.ramp_to(now_s_, step.velocity, config_.period_s);
   step.has_setpoint = started_;
   step.setpoint = path_.end();
-  if (step.estimate && all_finite(desired)) step.error = feature_error(step.estimate->features, desired.features);
   step.delay_s = delay_s();
   step.delay_is_known = delay_is_known();
   const bool tracks = step.action == ControlAction::track && step.estimate;
@@ -260,6 +270,19 @@ VisualController::Law VisualController::tracking_law(const std::optional<Estimat
   return law;
 }
 
+/// The limit that keeps the arm from its goal, as soon as that is plain.
+std::optional<PositionLimit> VisualController::stops_at(const Law& law, const Eigen::Vector4d& q_joint,
+                                                        const DesiredFeatures& desired, const ControlStep& step) {
+  const MotionState motion = path_.at(now_s_);
+  const Eigen::Vector4d wanted = slow_to_rate(law.velocity, law.rate);
+  const Stop stop = stop_at({config_.limits, config_.window}, config_.scales, motion.position,
+                            ends_at(*step.estimate, motion.position - q_joint), wanted, law.weight);
+  const Eigen::Matrix4d& jacobian = step.estimate->jacobian;
+  const bool stopped = limited_goal_.add(desired, step.error, jacobian * wanted, jacobian * (wanted - stop.left),
+                                         jacobian * motion.velocity, config_.period_s);
+  return stopped ? stop.at : std::nullopt;
+}
+
 /// The law's velocity, as far as the limits allow it.
 void VisualController::limit(const Law& law, const Eigen::Vector4d& q_joint, ControlStep& step) const {
   const MotionState motion = path_.at(now_s_);
@@ -268,7 +291,7 @@ void VisualController::limit(const Law& law, const Eigen::Vector4d& q_joint, Con
   std::optional<EndPoints> ends;
   if (step.estimate) {
     const Estimate& now = *step.estimate;
-    ends = {now.ends_px + now.ends_jacobian * (motion.position - q_joint), now.ends_jacobian};
+    ends = ends_at(now, motion.position - q_joint);
     JointLimits confirmed = config_.limits;
     confirmed.rate = confirmed.rate.cwiseMin(law.rate);
     wanted = cross_gaps(confirmed, motion, now.gap, arm_response_.drive(), q_joint, law.feed_forward, slowed,

@@ -12,7 +12,6 @@
 #include "lapservo/control/arm_response.h"
 #include "lapservo/control/control_step.h"
 #include "lapservo/control/controller_config.h"
-#include "lapservo/control/error_growth.h"
 #include "lapservo/control/estimator.h"
 #include "lapservo/control/feature_model.h"
 #include "lapservo/control/following_error_limit.h"
@@ -21,6 +20,7 @@
 #include "lapservo/control/image_measurement.h"
 #include "lapservo/control/image_response.h"
 #include "lapservo/control/joint_history.h"
+#include "lapservo/control/standing_goal.h"
 #include "lapservo/control/trajectory.h"
 #include "lapservo/control/wild_joints.h"
 #include "lapservo/robot/joint_path.h"
@@ -115,6 +115,8 @@ class VisualController {
   HoldReason by_their_rate(HoldReason reason) const;
   Law decide(HoldReason reason, const std::optional<Estimate>& estimate, const DesiredFeatures& desired) const;
   Law tracking_law(const std::optional<Estimate>& estimate, const DesiredFeatures& desired) const;
+  std::optional<PositionLimit> stops_at(const Law& law, const Eigen::Vector4d& q_joint, const DesiredFeatures& desired,
+                                        const ControlStep& step);
   void limit(const Law& law, const Eigen::Vector4d& q_joint, ControlStep& step) const;
   Eigen::Vector4d limited_hold(const Eigen::Vector4d& braking) const;
 
@@ -128,6 +130,7 @@ class VisualController {
   FrozenImage frozen_image_;
   ImageResponse image_response_;
   ErrorGrowth error_growth_;
+  LimitedGoal limited_goal_;
   HoldReason until_start_ = HoldReason::none;  ///< a reason that only an operator ends
   WildJoints wild_joints_;
   JointPath path_;

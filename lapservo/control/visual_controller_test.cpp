@@ -250,6 +250,43 @@ TEST(VisualController, NoJointIsFasterThanImagesHaveConfirmed) {
   EXPECT_NEAR(fastest, 1, 1e-9);
 }
 
+// Goals between which and the start a joint has its limit are said until another goal is given, but where the way
+// along the limit leads past the marker's seam; those on limits are reached.
+TEST(VisualController, SaysWhichLimitKeepsItFromItsGoal) {
+  const Flaws flaws = usual_flaws();
+  int said = 0;
+  for (std::uint64_t seed = 1; seed <= 24; ++seed) {
+    SCOPED_TRACE(seed);
+    ControllerConfig config = testing::test_config(flaws), tight = config;
+    Random random(seed);
+    const Eigen::Vector4d start = testing::random_start({}, config, flaws, random),
+                          there = testing::random_start({}, config, flaws, random);
+    const auto goal = [&](const Eigen::Vector4d& q) {
+      return set_point(testing::exact_map(TestRig(), q + flaws.offset).value().features);
+    };
+    tight.limits.lower = start.cwiseMin(there), tight.limits.upper = start.cwiseMax(there);
+    VisualController reaches(tight, testing::model_of({}));
+    const auto reached = TestSimulator({}, flaws, start, seed).run(reaches, goal(there), 15);
+    for (const Moment& m : reached) ASSERT_NE(m.step.reason, HoldReason::goal_beyond_limit) << m.time_s;
+    EXPECT_LT(settled_s(reached), 14);
+
+    Eigen::Index joint = 0;
+    (there - start).cwiseQuotient(config.scales.joints).cwiseAbs().maxCoeff(&joint);
+    const bool upper = there[joint] > start[joint];
+    (upper ? config.limits.upper : config.limits.lower)[joint] = (start[joint] + there[joint]) / 2;
+    VisualController controller(config, testing::model_of({}));
+    TestSimulator simulator({}, flaws, start, seed);
+    const Moment held = simulator.run(controller, goal(there), 15).back();
+    EXPECT_TRUE(held.step.velocity.isZero());
+    if (held.step.reason == HoldReason::error_grows) continue;
+    ASSERT_EQ(held.step.reason, HoldReason::goal_beyond_limit);
+    ++said;
+    EXPECT_EQ(std::pair(held.step.stops_at->of, held.step.stops_at->upper), std::pair(joint, upper));
+    EXPECT_EQ(simulator.run(controller, goal(start), 0.1).front().step.reason, HoldReason::none);
+  }
+  EXPECT_GE(said, 23);
+}
+
 TestRig wrong_rig(Random& random) {
   TestRig rig;
   const double focal = random.uniform(0.8, 1.2);

@@ -6,8 +6,7 @@
 namespace lapservo::internal {
 
 /// The beginning of a stranger's text as one line of plain letters, for messages.
-inline std::string printable(const std::string& text) {
-  constexpr std::size_t longest = 40;
+inline std::string printable(const std::string& text, std::size_t longest = 40) {
   std::string shown = text.substr(0, longest);
   for (char& c : shown) c = c >= ' ' && c <= '~' ? c : '?';
   return shown;

@@ -78,6 +78,7 @@ CrtkRobot::CrtkRobot(Transport& transport, const std::string& arm, const Interlo
   hear("measured_js", &Interlock::on_measured);
   hear("setpoint_js", &Interlock::on_setpoint);
   hear("operating_state", &Interlock::on_operating_state);
+  hear("error", &Interlock::on_error);
   const auto watch = [&](const std::string& of, const Commands& commands) {
     for (const auto& [type, names] : commands)
       for (const char* name : names)

@@ -15,9 +15,9 @@
 
 namespace lapservo::internal {
 
-/// A CRTK arm behind a transport: measured_js, setpoint_js and operating_state come in, servo_jp goes out in a thread
-/// of its own, with real-time priority where the system grants it, as the interlock allows. Commands of others come in
-/// by the topics that move an arm or change its efforts (servo_jp, move_jp, servo_cp, servo_cv, servo_ci, hold,
+/// A CRTK arm behind a transport: measured_js, setpoint_js, operating_state and error come in, servo_jp goes out in a
+/// thread of its own, with real-time priority where the system grants it, as the interlock allows. Commands of others
+/// come in by the topics that move an arm or change its efforts (servo_jp, move_jp, servo_cp, servo_cv, servo_ci, hold,
 /// use_gravity_compensation ...). Joints that are not the rig's, and who reads the setpoints where that are too many,
 /// are said on stderr. Destroyed, it sends nothing any more: the arm stays at its last setpoint.
 class CrtkRobot : public Robot {

@@ -76,6 +76,13 @@ TEST(CrtkRobot, ACommandOfAnotherByAnyTopicOfMotionHolds) {
   }
 }
 
+TEST(CrtkRobot, TellsAFaultsWords) {
+  Room room;
+  room.transport.say("/PSM1/error", TextMessage{"power loss"});
+  room.transport.say("/PSM1/operating_state", OperatingStateMessage{1000.01, "FAULT"});
+  EXPECT_EQ(room.robot.state().other_state, "FAULT (power loss)");
+}
+
 TEST(CrtkRobot, SaysOnceWhoReadsBesideTheArm) {
   ::testing::internal::CaptureStderr();
   Room room;

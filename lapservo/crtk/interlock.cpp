@@ -5,6 +5,8 @@
 #include <map>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "lapservo/core/printable.h"
 #include "lapservo/crtk/joint_map.h"
 #include "lapservo/tool/wrist.h"
@@ -89,7 +91,7 @@ bool Interlock::is_of(FirstSender& sender, std::uint64_t source, double arrival_
 void Interlock::begin_anew(double arrival_s) {
   measured_sender_ = {}, setpoint_sender_ = {}, state_sender_ = {};
   measured_.reset(), setpoint_.reset(), operating_state_.reset();
-  rest_.reset(), moved_s_.reset();
+  rest_.reset(), moved_s_.reset(), fault_s_.reset();
   sent_.clear();
   give_up(Blocked::restarted, arrival_s);
 }
@@ -158,8 +160,18 @@ void Interlock::on_setpoint(const JointMessage& message, double arrival_s) {
 void Interlock::on_operating_state(const OperatingStateMessage& message, double arrival_s) {
   // Another program's state may be this arm's, too: the one before does not count then.
   if (!is_of(state_sender_, message.source, arrival_s)) return operating_state_.reset();
+  const bool changed = operating_state_ && operating_state_->state != message.state;
+  const bool is_fault = message.state == to_string(OperatingState::fault);
+  if (changed || !is_fault) fault_s_ = is_fault ? std::optional(arrival_s) : std::nullopt;
   operating_state_ = message;
   watch(arrival_s);
+}
+
+void Interlock::on_error(const TextMessage& message, double arrival_s) {
+  constexpr std::size_t longest = 120;
+  if (message.latched == Latched::again) return;
+  error_ = {printable(message.text, longest), message.source};
+  error_s_ = arrival_s;
 }
 
 void Interlock::on_foreign_command(double arrival_s) {
@@ -292,10 +304,18 @@ JointState Interlock::latest(double now_s) const {
   if (measured_) state.time_s = measured_->time_s, state.q = JointVector::from_vector(measured_->q);
   if (measured_) state.wrist_rad = measured_->wrist_rad;
   if (!operating_state_) return state;
-  const auto known = operating_state_from_string(operating_state_->state);
-  state.operating_state = known.value_or(OperatingState::disabled);
-  if (!known) state.other_state = printable(operating_state_->state);
+  state.operating_state = operating_state_from_string(operating_state_->state).value_or(OperatingState::disabled);
+  state.other_state = other_state();
   return state;
+}
+
+// An arm says what is wrong, then that its state is FAULT, on topics that do not wait for each other.
+std::string Interlock::other_state() const {
+  constexpr double before_s = 1;
+  const std::string& state = operating_state_->state;
+  if (!operating_state_from_string(state)) return printable(state);
+  const bool explains = fault_s_ && error_s_ >= *fault_s_ - before_s && error_.source == operating_state_->source;
+  return explains && !error_.text.empty() ? fmt::format("{} ({})", state, error_.text) : "";
 }
 
 void Interlock::start(double now_s) {

@@ -76,6 +76,8 @@ class Interlock {
   void on_measured(const JointMessage& message, double arrival_s);
   void on_setpoint(const JointMessage& message, double arrival_s);
   void on_operating_state(const OperatingStateMessage& message, double arrival_s);
+  /// Changes JointState::other_state alone, and that of a FAULT which comes within a second, or is there.
+  void on_error(const TextMessage& message, double arrival_s);
   /// So many nodes read the setpoints.
   void on_readers(std::size_t count) { readers_ = count; }
   /// The computer was suspended: the arm may be anywhere.
@@ -127,6 +129,7 @@ class Interlock {
   std::optional<double> stamped(StampClock& clock, const JointMessage& message, double arrival_s);
   Eigen::Vector4d q_of(const JointMessage& message, const Places& places) const;
   Blocked blocked(double now_s) const;
+  std::string other_state() const;
   void watch(double now_s);
   void stop(Blocked why);
   void give_up(Blocked why, double now_s);
@@ -158,6 +161,9 @@ class Interlock {
   ReadingBuffer readings_;
   bool finite_ = true;
   std::optional<OperatingStateMessage> operating_state_;
+  std::optional<double> fault_s_;  // since when it is FAULT; nullopt where it was when it was heard first
+  TextMessage error_;              // the last one, printable
+  double error_s_ = 0;
   std::optional<std::size_t> readers_;  // of the setpoints
   std::optional<double> foreign_s_;     // when somebody else commanded the arm last
   Blocked untold_ = Blocked::none;      // what was amiss first since state(); other things count more than silence

@@ -308,6 +308,38 @@ TEST(Interlock, AStateThatNobodyKnowsIsToldAsItIs) {
   EXPECT_EQ(state.other_state, "READY?");
 }
 
+// It says so a moment before or after the fault; of before, of another program and of a connection before they are not.
+TEST(Interlock, AFaultIsToldInTheArmsOwnWords) {
+  const auto told = [](const TextMessage& error, double before_s, const std::string& state = "FAULT") {
+    Bench bench;
+    bench.interlock.on_error(error, bench.now_s);
+    bench.control(0.3 + before_s, slow);
+    EXPECT_EQ(bench.blocked, Blocked::none) << "words alone change nothing";
+    EXPECT_GT(bench.sent_count, 100);
+    bench.enable(state);
+    return bench.interlock.latest(bench.now_s).other_state;
+  };
+  const TextMessage words{"PSM1: power\nloss " + std::string(200, '!')};
+  const std::string its_own = "FAULT (PSM1: power?loss " + std::string(103, '!') + ")";
+  EXPECT_EQ(told(words, 0.6), its_own);
+  EXPECT_EQ(told(words, 0.8), "");
+  EXPECT_EQ(told(words, 0, "PAUSED"), "");
+  EXPECT_EQ(told({"x", 7}, 0), "");
+  EXPECT_EQ(told({"x", 0, Latched::again}, 0), "");
+  Interlock interlock(config_of());
+  const auto told_in = [&](const char* state, double time_s) {
+    interlock.on_operating_state({epoch_s, state}, time_s);
+    interlock.on_operating_state({epoch_s, state}, time_s);
+    return interlock.latest(time_s).other_state;
+  };
+  interlock.on_error(words, 10);
+  EXPECT_EQ(told_in("FAULT", 10), "") << "when the words were said is not known";
+  EXPECT_EQ(told_in("ENABLED", 12), "");
+  EXPECT_EQ(told_in("FAULT", 12), "");
+  interlock.on_error(words, 12.1);
+  EXPECT_EQ(told_in("FAULT", 20), its_own);
+}
+
 // A fault of no time at all, between two ticks: what was sent before is not taken up as if nothing had happened.
 TEST(Interlock, TellsOfAFaultHoweverShort) {
   for (const Fault& fault : faults()) {

@@ -63,6 +63,13 @@ struct StringMessage {
   Latched latched = Latched::no;
 };
 
+/// std_msgs/String: error, in an arm's own words.
+struct TextMessage {
+  std::string text;
+  std::uint64_t source = 0;  ///< as in JointMessage
+  Latched latched = Latched::no;
+};
+
 /// A command of motion, of which only the arrival counts.
 struct CommandMessage {};
 

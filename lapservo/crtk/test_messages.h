@@ -18,6 +18,7 @@ struct Fields {
   static auto of(const JointMessage& m) { return std::tie(m.names, m.positions); }
   static auto of(const OperatingStateMessage& m) { return std::tie(m.state, m.is_homed, m.is_busy); }
   static auto of(const StringMessage& m) { return std::tie(m.text); }
+  static auto of(const TextMessage& m) { return std::tie(m.text); }
   static auto of(const JoyMessage& m) { return std::tie(m.buttons); }
   static auto of(const BoolMessage& m) { return std::tie(m.value); }
   static auto of(const TrajectoryMessage& m) {
@@ -45,6 +46,7 @@ constexpr double sample_stamp_s = 1700000000.123456;
 const JointMessage sample_joints{sample_stamp_s, {"yaw", "", "pitch"}, {0.25, 0, -1.5}};
 const OperatingStateMessage sample_state{sample_stamp_s, "ENABLED", true, false};
 const StringMessage sample_string{sample_stamp_s, "enable"};
+const TextMessage sample_words{"PSM1: power loss"};
 const JoyMessage sample_joy{sample_stamp_s, {1, 0, -3}};
 const TrajectoryMessage sample_trajectory{sample_stamp_s, {"s_rad"},  {{0, {1}}, {2.25, {3, 4}}}, 0,
                                           Latched::no,    "endoscope"};
@@ -69,6 +71,7 @@ inline void expect_carries_each_kind(Transport& from, const std::string& in, Tra
   const auto carry = [&](const std::string& kind, const auto& sent) { carry_as(kind, sent, sent); };
   carry("joints", sample_joints);
   carry("text", sample_string);
+  carry("words", sample_words);
   carry_as("joy", sample_joy, BoolMessage{true});
   carry("bool", BoolMessage{true});
   carry("trajectory", sample_trajectory);

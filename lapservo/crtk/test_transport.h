@@ -95,13 +95,13 @@ class TestTransport : public Transport {
 
   std::mutex mutex_;
   std::set<std::string> readers_{"/arm"};
-  std::tuple<Kept<JointMessage>, Kept<OperatingStateMessage>, Kept<StringMessage>, Kept<JoyMessage>, Kept<BoolMessage>,
-             Kept<TrajectoryMessage>, Kept<ImageMessage>, Kept<CompressedImageMessage>, Kept<CameraInfoMessage>,
-             Kept<PoseMessage>, Kept<PlaceMessage>, Kept<TransformsMessage>, Kept<StaticTransformsMessage>,
-             Kept<CylindersMessage>, Kept<DiagnosticMessage>, Kept<ObservationMessage>>
+  std::tuple<Kept<JointMessage>, Kept<OperatingStateMessage>, Kept<StringMessage>, Kept<TextMessage>, Kept<JoyMessage>,
+             Kept<BoolMessage>, Kept<TrajectoryMessage>, Kept<ImageMessage>, Kept<CompressedImageMessage>,
+             Kept<CameraInfoMessage>, Kept<PoseMessage>, Kept<PlaceMessage>, Kept<TransformsMessage>,
+             Kept<StaticTransformsMessage>, Kept<CylindersMessage>, Kept<DiagnosticMessage>, Kept<ObservationMessage>>
       kept_;
-  std::tuple<Handlers<JointMessage>, Handlers<OperatingStateMessage>, Handlers<StringMessage>, Handlers<BoolMessage>,
-             Handlers<CommandMessage>, Handlers<TrajectoryMessage>, Handlers<ImageMessage>,
+  std::tuple<Handlers<JointMessage>, Handlers<OperatingStateMessage>, Handlers<StringMessage>, Handlers<TextMessage>,
+             Handlers<BoolMessage>, Handlers<CommandMessage>, Handlers<TrajectoryMessage>, Handlers<ImageMessage>,
              Handlers<CompressedImageMessage>, Handlers<PlaceMessage>>
       handlers_;
 };

@@ -62,13 +62,14 @@ class Transport {
  protected:
   using AnyPublisher =
       std::variant<Publisher<JointMessage>, Publisher<OperatingStateMessage>, Publisher<StringMessage>,
-                   Publisher<JoyMessage>, Publisher<BoolMessage>, Publisher<TrajectoryMessage>, Publisher<ImageMessage>,
-                   Publisher<CompressedImageMessage>, Publisher<CameraInfoMessage>, Publisher<PoseMessage>,
-                   Publisher<PlaceMessage>, Publisher<TransformsMessage>, Publisher<StaticTransformsMessage>,
-                   Publisher<CylindersMessage>, Publisher<DiagnosticMessage>, Publisher<ObservationMessage>>;
+                   Publisher<TextMessage>, Publisher<JoyMessage>, Publisher<BoolMessage>, Publisher<TrajectoryMessage>,
+                   Publisher<ImageMessage>, Publisher<CompressedImageMessage>, Publisher<CameraInfoMessage>,
+                   Publisher<PoseMessage>, Publisher<PlaceMessage>, Publisher<TransformsMessage>,
+                   Publisher<StaticTransformsMessage>, Publisher<CylindersMessage>, Publisher<DiagnosticMessage>,
+                   Publisher<ObservationMessage>>;
   using AnyHandler = std::variant<Handler<JointMessage>, Handler<OperatingStateMessage>, Handler<StringMessage>,
-                                  Handler<BoolMessage>, Handler<TrajectoryMessage>, Handler<ImageMessage>,
-                                  Handler<CompressedImageMessage>, Handler<PlaceMessage>>;
+                                  Handler<TextMessage>, Handler<BoolMessage>, Handler<TrajectoryMessage>,
+                                  Handler<ImageMessage>, Handler<CompressedImageMessage>, Handler<PlaceMessage>>;
   /// Whether the last message reaches subscribers that come later.
   template <typename Message>
   static constexpr bool is_latched =

@@ -25,7 +25,8 @@ struct JointState {
   /// The first reason since the last call of Robot::state() for which the arm must not be moved, however short it was.
   /// Reasons that follow from the other fields may be left to the Supervisor.
   Blocked blocked = Blocked::none;
-  /// The state as the arm names it, where that is no OperatingState ("READY"): operating_state is disabled then.
+  /// The state in the arm's own words, where they say more than operating_state: a name that is no OperatingState
+  /// ("READY", where that is disabled), a fault's cause ("FAULT (PSM1: power loss)").
   std::string other_state{};
   /// The wrist's joints behind the shaft, in the order of the rig's tool; empty where the arm does not measure them.
   std::vector<double> wrist_rad{};

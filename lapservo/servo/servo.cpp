@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "lapservo/control/delay_estimator.h"
+#include "lapservo/control/motion_limits.h"
 #include "lapservo/servo/image_features.h"
 
 namespace lapservo::internal {
@@ -35,7 +36,9 @@ std::string unanswered_text(const Unanswered& found, const std::array<std::strin
       name);
 }
 
-std::string remedy_of(const ControlStep& control, const std::array<std::string, 4>& names, ControlMode mode) {
+std::string remedy_of(const ControlStep& control, const std::array<std::string, 4>& names,
+                      const ControllerConfig& config) {
+  const ControlMode mode = config.mode;
   switch (control.reason) {
     case HoldReason::slow_images:
       return "at least 10 images a second are needed: check the camera's rate, its exposure and the network";
@@ -57,6 +60,10 @@ std::string remedy_of(const ControlStep& control, const std::array<std::string, 
     case HoldReason::tip_unreachable:
       return "the shaft can't hold the tip at its goal with the wrist as it is: straighten the wrist, or give another "
              "goal";
+    case HoldReason::goal_beyond_limit:
+      return control.stops_at ? PositionBounds(config.limits, config.window).text(*control.stops_at) +
+                                    " keeps the arm from its goal: give another goal"
+                              : "";
     default:
       return "";
   }
@@ -124,7 +131,7 @@ ServoDecision Servo::decide(const ServoInput& input) {
   decision.send = orderly(decision.control) && !begins_;
   start_anew_when_at_rest(input, decision.control.reason);
   decision.release = recovery_ && recovery_->moved();
-  decision.remedy = remedy_of(decision.control, names_, controller_.config().mode);
+  decision.remedy = remedy_of(decision.control, names_, controller_.config());
   if (enabled && !decision.release) return decision;
   decision.control.action = ControlAction::hold;
   if (!decision.release) decision.control.reason = HoldReason::arm_not_enabled, decision.remedy.clear();

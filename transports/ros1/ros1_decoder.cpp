@@ -33,6 +33,10 @@ void in_order(MessageBytes& from, StringMessage& message) {
   from(message.text);
 }
 
+void in_order(MessageBytes& from, TextMessage& message) {
+  from(message.text);
+}
+
 void in_order(MessageBytes& from, BoolMessage& message) {
   from(message.value);
 }
@@ -54,6 +58,7 @@ template std::optional<OperatingStateMessage> decode_ros1(std::span<const std::u
 template std::optional<BoolMessage> decode_ros1(std::span<const std::uint8_t>);
 template std::optional<JoyMessage> decode_ros1(std::span<const std::uint8_t>);
 template std::optional<StringMessage> decode_ros1(std::span<const std::uint8_t>);
+template std::optional<TextMessage> decode_ros1(std::span<const std::uint8_t>);
 template std::optional<ImageMessage> decode_ros1(std::span<const std::uint8_t>);
 template std::optional<PlaceMessage> decode_ros1(std::span<const std::uint8_t>);
 template std::optional<CompressedImageMessage> decode_ros1(std::span<const std::uint8_t>);

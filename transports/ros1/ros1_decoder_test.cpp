@@ -41,6 +41,7 @@ TEST(Ros1Decoder, ReadsWhatRosWritesAndRefusesWhatIsCutShortOrLeftOver) {
   expect_read_whole_and_nothing_else(sample_joints);
   expect_read_whole_and_nothing_else(sample_state);
   expect_read_whole_and_nothing_else(sample_string);
+  expect_read_whole_and_nothing_else(sample_words);
   expect_read_whole_and_nothing_else(sample_trajectory);
   expect_read_whole_and_nothing_else(sample_place);
   expect_read_whole_and_nothing_else(sample_joy);

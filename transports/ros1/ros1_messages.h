@@ -18,6 +18,7 @@
 #include <sensor_msgs/JointState.h>
 #include <sensor_msgs/Joy.h>
 #include <std_msgs/Bool.h>
+#include <std_msgs/String.h>
 #include <string>
 #include <tf2_msgs/TFMessage.h>
 #include <trajectory_msgs/JointTrajectory.h>
@@ -48,6 +49,7 @@ std_msgs::Bool_<Ros1ByteAllocator> ros1_type_of(const BoolMessage&);
 trajectory_msgs::JointTrajectory_<Ros1ByteAllocator> ros1_type_of(const TrajectoryMessage&);
 crtk_msgs::OperatingState_<Ros1ByteAllocator> ros1_type_of(const OperatingStateMessage&);
 crtk_msgs::StringStamped_<Ros1ByteAllocator> ros1_type_of(const StringMessage&);
+std_msgs::String_<Ros1ByteAllocator> ros1_type_of(const TextMessage&);
 sensor_msgs::Image_<Ros1ByteAllocator> ros1_type_of(const ImageMessage&);
 sensor_msgs::CompressedImage_<Ros1ByteAllocator> ros1_type_of(const CompressedImageMessage&);
 sensor_msgs::CameraInfo_<Ros1ByteAllocator> ros1_type_of(const CameraInfoMessage&);

@@ -69,6 +69,7 @@ int main(int argc, char** argv) {
     subscriptions.push_back((transport.*subscribe)("/in/" + kind, [say](auto&& message) { say(message); }));
   };
   echo("joints", &Transport::publisher<JointMessage>, &Transport::subscribe<JointMessage>);
+  echo("words", &Transport::publisher<TextMessage>, &Transport::subscribe<TextMessage>);
   echo("bool", &Transport::publisher<BoolMessage>, &Transport::subscribe<BoolMessage>);
   echo("trajectory", &Transport::publisher<TrajectoryMessage>, &Transport::subscribe<TrajectoryMessage>);
   echo("image", &Transport::publisher<ImageMessage>, &Transport::subscribe<ImageMessage>);

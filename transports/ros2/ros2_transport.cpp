@@ -35,7 +35,8 @@ template <typename Message>
 std::vector<Delivery> deliveries_of() {
   if constexpr (std::is_same_v<Message, OperatingStateMessage>)
     return {Delivery::latched, Delivery::reliable, Delivery::best_effort};
-  if constexpr (std::is_same_v<Message, StringMessage> || std::is_same_v<Message, TrajectoryMessage>)
+  if constexpr (std::is_same_v<Message, StringMessage> || std::is_same_v<Message, TextMessage> ||
+                std::is_same_v<Message, TrajectoryMessage>)
     return {Delivery::reliable, Delivery::best_effort};
   return {Delivery::best_effort};
 }

@@ -33,6 +33,7 @@ WireType<trajectory_msgs_msg_dds__JointTrajectory_, trajectory_msgs_msg_dds__Joi
 WireType<crtk_msgs_msg_dds__OperatingState_, crtk_msgs_msg_dds__OperatingState__desc> wire_type_of(
     const OperatingStateMessage&);
 WireType<crtk_msgs_msg_dds__StringStamped_, crtk_msgs_msg_dds__StringStamped__desc> wire_type_of(const StringMessage&);
+WireType<std_msgs_msg_dds__String_, std_msgs_msg_dds__String__desc> wire_type_of(const TextMessage&);
 WireType<sensor_msgs_msg_dds__Joy_, sensor_msgs_msg_dds__Joy__desc> wire_type_of(const JoyMessage&);
 WireType<std_msgs_msg_dds__Bool_, std_msgs_msg_dds__Bool__desc> wire_type_of(const BoolMessage&);
 WireType<sensor_msgs_msg_dds__Image_, sensor_msgs_msg_dds__Image__desc> wire_type_of(const ImageMessage&);
