@@ -21,9 +21,8 @@
 #include "lapservo/testing/rigs.h"
 #include "lapservo/tool/test_tools.h"
 
-namespace lapservo::testing {
+namespace lapservo::testing::dynamic_loop_test {
 using namespace internal;
-namespace {
 
 /// The decision of one tick, and its result.
 struct DynamicTick {
@@ -336,5 +335,4 @@ TEST(DynamicLoop, TheTipStaysWhereItIsWhileTheWristMoves) {
   }
 }
 
-}  // namespace
-}  // namespace lapservo::testing
+}  // namespace lapservo::testing::dynamic_loop_test

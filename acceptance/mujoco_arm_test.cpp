@@ -4,8 +4,7 @@
 
 #include <gtest/gtest.h>
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::mujoco_arm_test {
 
 const Eigen::Vector4d start(0.05, 1.57, 0.1, 1.2);
 const Eigen::Vector4d small(1e-4, 1e-4, 1e-5, 2e-3);  // beside a motion of a few mrad or tenths of a mm
@@ -70,5 +69,4 @@ TEST(MujocoArm, LagsByItsDamping) {
     EXPECT_NEAR(behind[i], rate[i] * lag[i] + std::copysign(stuck[i], rate[i]), 0.1 * std::abs(behind[i])) << i;
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::mujoco_arm_test

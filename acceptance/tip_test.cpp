@@ -20,9 +20,7 @@
 #include "lapservo/testing/scenes.h"
 #include "lapservo/vision/tracker.h"
 
-namespace lapservo {
-using namespace internal;
-namespace {
+namespace lapservo::internal::tip_test {
 
 constexpr double degree = std::numbers::pi / 180;
 
@@ -173,5 +171,4 @@ TEST(Tip, AToolInTheImageDoesNotDisturbTheMarker) {
   EXPECT_LE(with_rad, 1.1 * without_rad);
 }
 
-}  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal::tip_test

@@ -8,8 +8,7 @@
 
 #include "lapservo/core/random.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::delay_estimator_test {
 
 /// Slow motion of all joints, as a trajectory or an approach makes it.
 Eigen::Vector4d joints_at(double time_s) {
@@ -132,5 +131,4 @@ TEST(DelayEstimator, SaysNothingWithoutMotion) {
   EXPECT_FALSE(DelayEstimator().estimate());
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::delay_estimator_test

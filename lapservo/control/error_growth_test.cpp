@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::error_growth_test {
 
 DesiredFeatures goal(double r_px, double rate = 0) {
   DesiredFeatures desired;
@@ -45,5 +44,4 @@ TEST(ErrorGrowth, IsNoneWhereTheGoalMoves) {
   EXPECT_FALSE(growth.add(goal(700), {0, 310, 0, 0})) << "another goal";
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::error_growth_test

@@ -15,8 +15,7 @@
 #include "lapservo/core/error.h"
 #include "lapservo/testing/input_error.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::visual_controller_test {
 
 using testing::Flaws;
 using testing::Moment;
@@ -679,5 +678,4 @@ TEST(VisualController, SaysWhatIsWrongWithAConfiguration) {
   EXPECT_THROW(VisualController({}, {}), InputError) << "a model is needed";
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::visual_controller_test

@@ -12,8 +12,7 @@
 
 #include "lapservo/core/random.h"
 
-namespace lapservo {
-namespace {
+namespace lapservo::internal::supervisor_test {
 
 constexpr double tick_s = 0.01;
 const Eigen::Vector4d slow(0.1, -0.1, 0.01, 0.3), at_rest(1e-4, 1e-4, 5e-5, 1e-4);
@@ -469,5 +468,4 @@ TEST(Supervisor, MovesExactlyWhereTheTableAllowsIt) {
   EXPECT_GT(armed, steps / 20);
 }
 
-}  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal::supervisor_test

@@ -10,8 +10,7 @@
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::controller_file_test {
 
 ControllerConfig unusual() {
   ControllerConfig config;
@@ -97,5 +96,4 @@ TEST(ControllerFile, NamesFileFieldValueAndExpectation) {
   }
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::controller_file_test

@@ -9,8 +9,7 @@
 #include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/testing/rigs.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::disagreement_test {
 
 using Cause = Explanation::Cause;
 
@@ -109,5 +108,4 @@ TEST(Disagreement, NamesTheCauseOfRandomWorlds) {
   }
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::disagreement_test

@@ -36,8 +36,7 @@
 #include "lapservo/testing/temporary_folder.h"
 #include "lapservo/testing/wait_for.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::run_test {
 
 // The trajectory as the half-size camera sees it.
 Trajectory small_trajectory() {
@@ -847,5 +846,4 @@ TEST(Run, RefusesOtherClocksThanTheLoops) {
   EXPECT_EQ(refusal_of({.duration_s = NAN}), "run: duration_s: is nan, expected 0 or more");
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::run_test

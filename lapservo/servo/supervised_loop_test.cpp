@@ -12,8 +12,7 @@
 #include "lapservo/servo/servo.h"
 #include "lapservo/testing/rigs.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::supervised_loop_test {
 
 constexpr double period_s = 1.0 / 60;
 const Eigen::Vector4d start(0.05, 1.57, 0.064, 1.2), at_rest(1e-4, 1e-4, 5e-5, 1e-4);
@@ -142,5 +141,4 @@ TEST(SupervisedLoop, NoJointMovesWhereNothingAllowsIt) {
   EXPECT_GT(moving, 20000);
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::supervised_loop_test

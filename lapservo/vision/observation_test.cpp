@@ -12,8 +12,7 @@
 #include "lapservo/testing/shots.h"
 #include "lapservo/vision/tracker.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::observation_test {
 
 using scenes::Shot;
 using scenes::usual_shot;
@@ -160,5 +159,4 @@ TEST(Observation, IsFiniteForEveryStatus) {
   EXPECT_GE(seen.size(), 5U);
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::observation_test

@@ -21,8 +21,7 @@
 #include "lapservo/vision/colour/blob_search.h"
 #include "lapservo/vision/tracker.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::surface_tracker_test {
 
 using scenes::Shot;
 using scenes::usual_shot;
@@ -648,5 +647,4 @@ TEST(SurfaceTracker, FindsAShaftThatIsHalfOutOfTheFrame) {
   EXPECT_LT(std::sqrt(normalised / found), 1.5);
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::surface_tracker_test

@@ -9,8 +9,7 @@
 #include "lapservo/testing/has.h"
 #include "lapservo/testing/scenes.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::marker_calibration_test {
 
 constexpr double mm = 1e-3;
 
@@ -124,5 +123,4 @@ TEST_F(CalibrateMarker, RefusesWhatCanNotTell) {
   EXPECT_NE(calibrate_marker(rig, 0, {}).refusal, "");
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::marker_calibration_test

@@ -27,8 +27,7 @@
 #include "lapservo/testing/rigs.h"
 #include "lapservo/testing/temporary_folder.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::registration_test {
 using lapservo::testing::has;
 using lapservo::testing::input_error;
 
@@ -415,5 +414,4 @@ TEST(RegisterRcm, RefusesOrNamesWhatNoPointExplainsAndItsSigmaHolds) {
     for (const double part : {0.01, 0.1, 0.3, 1.0, 3.0}) tell(&fault, part * fault.gross);
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::registration_test
