@@ -107,7 +107,7 @@ TEST(SupervisedLoop, NoJointMovesWhereNothingAllowsIt) {
   const auto happens = [&](double probability) { return random.uniform() < probability; };
   const FeatureModel model = feature_model(testing::paper_test_rig());
   long moving = 0;
-  for (int sequence = 0; sequence < 10000; ++sequence) {
+  for (int sequence = 0; sequence < 1000; ++sequence) {
     SCOPED_TRACE(::testing::Message() << "seed " << seed << ", sequence " << sequence);
     Room room(model);
     Eigen::Vector4d rest = start;
@@ -138,7 +138,7 @@ TEST(SupervisedLoop, NoJointMovesWhereNothingAllowsIt) {
       }
     }
   }
-  EXPECT_GT(moving, 20000);
+  EXPECT_GT(moving, 2000);
 }
 
 }  // namespace lapservo::internal::supervised_loop_test
