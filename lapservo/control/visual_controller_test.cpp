@@ -262,7 +262,7 @@ TestRig wrong_rig(Random& random) {
 
 TEST(VisualController, ConvergesInTheImageWithAWrongModelAndBacklash) {
   for (const bool gaps : {false, true})
-    for (std::uint64_t seed = 1; seed <= (gaps ? 40 : 200); ++seed) {
+    for (std::uint64_t seed = 1; seed <= (gaps ? 20 : 40); ++seed) {
       SCOPED_TRACE(seed);
       Flaws flaws = gaps ? usual_flaws({0, 0, 0.0002, 0.03}) : usual_flaws();
       flaws.delay_known = seed % 2 == 0;
