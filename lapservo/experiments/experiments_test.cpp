@@ -81,6 +81,12 @@ TEST(SingleInstrument, NeedsARegistration) {
               }).starts_with("a.yaml: instruments[0].camera_from_rcm"));
 }
 
+TEST(Rotation, TrialsStartWhereThePapersDo) {
+  EXPECT_DOUBLE_EQ(initial_rotation_rad(0), -3.5);
+  EXPECT_DOUBLE_EQ(initial_rotation_rad(9), -1.25);
+  EXPECT_NEAR(initial_rotation_rad(4) - initial_rotation_rad(3), 0.25, 1e-12);
+}
+
 TEST(Rotation, IsSummedUpByTrial) {
   Random random(seed);
   std::vector<RotationResult::Sample> samples;
