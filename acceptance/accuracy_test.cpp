@@ -16,9 +16,8 @@
 #include "lapservo/io/pictures/jpeg_picture.h"
 #include "lapservo/testing/sample_frames.h"
 
-namespace lapservo::acceptance {
+namespace lapservo::acceptance::accuracy_test {
 using namespace internal;
-namespace {
 
 constexpr double mrad = 1e-3, mm = 1e-3;
 constexpr double steepest_rad = 0.35;
@@ -281,5 +280,4 @@ TEST(Rendered, Cut) {
   expect_found_within(score, 0.8, 15 * mrad);
 }
 
-}  // namespace
-}  // namespace lapservo::acceptance
+}  // namespace lapservo::acceptance::accuracy_test

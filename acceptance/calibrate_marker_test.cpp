@@ -21,9 +21,8 @@
 #include "lapservo/core/random.h"
 #include "lapservo/testing/camera_effects.h"
 
-namespace lapservo::acceptance {
+namespace lapservo::acceptance::calibrate_marker_test {
 using namespace internal;
-namespace {
 
 constexpr double mm = 1e-3;
 constexpr double steepest_rad = 0.35;
@@ -182,5 +181,4 @@ INSTANTIATE_TEST_SUITE_P(
                       Errors{.name = "WithSubsampledChroma", .camera = "chroma420", .max_psi_rms_rad = 3e-3}),
     [](const auto& chosen) { return chosen.param.name; });
 
-}  // namespace
-}  // namespace lapservo::acceptance
+}  // namespace lapservo::acceptance::calibrate_marker_test

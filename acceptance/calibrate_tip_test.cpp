@@ -28,10 +28,9 @@
 #include "lapservo/testing/environment.h"
 #include "lapservo/tool/test_tools.h"
 
-namespace lapservo::acceptance {
+namespace lapservo::acceptance::calibrate_tip_test {
 using namespace internal;
 using namespace laboratories;
-namespace {
 
 const Eigen::Vector3d point_m(0.02, -0.02, 0.125);  // camera frame: the dimple, the middle of the board
 const Eigen::Vector3d usual_axis(0.65, -0.5, 0.57);
@@ -328,5 +327,4 @@ TEST_F(CalibrateTipTool, FindsAWristByTouchesFromEitherCornerOfAChessboard) {
   ToolTest::expect_refused("calibrate tip --touch wrong.csv" + to, {"wrong.csv", "column", "0 to 8"});
 }
 
-}  // namespace
-}  // namespace lapservo::acceptance
+}  // namespace lapservo::acceptance::calibrate_tip_test

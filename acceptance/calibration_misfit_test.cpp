@@ -26,10 +26,9 @@
 #include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/testing/environment.h"
 
-namespace lapservo::acceptance {
+namespace lapservo::acceptance::calibration_misfit_test {
 using namespace internal;
 using namespace laboratories;
-namespace {
 
 constexpr double wrong_sigmas = 4;
 
@@ -308,5 +307,4 @@ TEST(CalibrationMisfit, Marker) {
   EXPECT_GE(departed.named(), 0.8);
 }
 
-}  // namespace
-}  // namespace lapservo::acceptance
+}  // namespace lapservo::acceptance::calibration_misfit_test

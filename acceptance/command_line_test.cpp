@@ -29,9 +29,7 @@
 #include "recordings/test_bags.h"
 #endif
 
-namespace lapservo {
-using namespace internal;
-namespace {
+namespace lapservo::internal::command_line_test {
 namespace fs = std::filesystem;
 using lapservo::testing::read_file;
 using lapservo::testing::write_file;
@@ -768,5 +766,4 @@ TEST_F(CommandLine, CalibrateCameraRefusesBadInput) {
   expect_refused(calibrate + board + " --out in/large.png", {"large.png", "input itself"});
 }
 
-}  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal::command_line_test

@@ -24,9 +24,8 @@
 #include "lapservo/testing/sample_frames.h"
 #include "lapservo/testing/scenes.h"
 
-namespace lapservo::acceptance {
+namespace lapservo::acceptance::crossing_test {
 using namespace internal;
-namespace {
 
 constexpr double mm = 1e-3;
 
@@ -274,5 +273,4 @@ TEST(CrossingShafts, WhoIsFoundBeforeTheOneInFrontIsFittedAgain) {
   EXPECT_GE(found, 1) << "the test's own power";
 }
 
-}  // namespace
-}  // namespace lapservo::acceptance
+}  // namespace lapservo::acceptance::crossing_test

@@ -3,6 +3,7 @@
 #include <deque>
 #include <functional>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -12,6 +13,7 @@
 #include "lapservo/control/tracking_law.h"
 #include "lapservo/core/minimum_jerk.h"
 #include "lapservo/core/random.h"
+#include "lapservo/core/statistics.h"
 #include "lapservo/geometry/rotation.h"
 #include "lapservo/kinematics/tip_kinematics.h"
 #include "lapservo/servo/image_features.h"
@@ -21,9 +23,8 @@
 #include "lapservo/testing/rigs.h"
 #include "lapservo/tool/test_tools.h"
 
-namespace lapservo::testing {
+namespace lapservo::testing::dynamic_loop_test {
 using namespace internal;
-namespace {
 
 /// The decision of one tick, and its result.
 struct DynamicTick {
@@ -49,8 +50,6 @@ class DynamicLoop {
     return Eigen::Vector4d(Eigen::Vector4d::Zero());
   };
   std::function<void(double time_s, MujocoArm& arm)> meddle = [](double, MujocoArm&) {};
-  /// The image from its beginning arrives again and again, from a camera whose noise is known.
-  std::optional<Interval> frozen{};
   std::function<std::vector<double>(double time_s)> wrist_rad = [](double) { return std::vector<double>(); };
 
   std::vector<DynamicTick> run(const Trajectory& trajectory, double duration_s) {
@@ -82,8 +81,7 @@ class DynamicLoop {
       const DesiredFeatures desired = features.at(tick.time_s);
       tick.error = feature_error(seen.features, desired.features);
       if (k % 2 == 0)
-        freeze(
-            on_the_way.emplace_back(exposed(seen, camera_from_marker, arm.true_jp(), tick.time_s + latency_s, random)));
+        on_the_way.push_back(exposed(seen, camera_from_marker, arm.true_jp(), tick.time_s + latency_s, random));
       ServoInput input;
       input.time_s = tick.time_s;
       input.joints = joints;
@@ -113,7 +111,7 @@ class DynamicLoop {
     // r counts from where the rig has the RCM.
     image.features[1] += (seen.ends_px.head<2>() - rcm_image_px(rig, std::nullopt).value()).norm() - seen.features[1];
     for (int i = 0; i < 4; ++i) image.ends_px[i] = seen.ends_px[i] + 0.15 * random.normal();
-    const auto noise = [&](double rms) {
+    const auto noise = [&](double rms) -> Eigen::Vector3d {
       return rms * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
     };
     image.camera_from_marker = Rigid3{rotation_by(noise(0.5e-3)) * camera_from_marker.rotation,
@@ -121,14 +119,6 @@ class DynamicLoop {
     image.covariance = sigma.cwiseAbs2().asDiagonal();
     image.q = q;
     return image;
-  }
-  void freeze(ImageMeasurement& image) {
-    const bool repeats = frozen && frozen->contains(image.time_s) && shown_;
-    const double stamp_s = image.time_s;
-    if (!repeats) shown_ = image;
-    image = *shown_;
-    image.time_s = stamp_s;
-    if (repeats) image.repetition = Repetition::of_a_noisy_camera;
   }
   static void move(MujocoArm& arm, const std::optional<JointPath>& path, DynamicTick& tick, double period_s) {
     constexpr int parts = 16;
@@ -138,8 +128,6 @@ class DynamicLoop {
       tick.fastest = tick.fastest.cwiseMax(arm.true_velocity().cwiseAbs());
     }
   }
-
-  std::optional<ImageMeasurement> shown_{};
 };
 
 /// Root mean square of the errors from `from_s` on.
@@ -159,10 +147,18 @@ bool holds(const DynamicTick& tick) {
 }
 
 TEST(DynamicLoop, CrossesFrictionAtReversals) {
-  DynamicLoop sticking, smooth;
-  smooth.arm_config.friction.setZero();
-  for (DynamicLoop* loop : {&sticking, &smooth}) {
-    const Eigen::Vector4d rms = rms_from(loop->run(papers, 20), 5);
+  for (const bool sticks : {true, false}) {
+    DynamicLoop loop;
+    if (!sticks) loop.arm_config.friction.setZero();
+    const MujocoArmConfig& config = loop.arm_config;
+    std::vector<double> stuck_rad;  // psi's setpoint beyond its joint and lag
+    loop.meddle = [&](double, MujocoArm& arm) {
+      const double lag_s = config.derivative_gain[3] / config.proportional_gain[3];
+      const double ahead_rad = arm.setpoint()[3] - arm.measured_jp()[3];
+      stuck_rad.push_back(std::abs(ahead_rad - lag_s * arm.true_velocity()[3]));
+    };
+    const Eigen::Vector4d rms = rms_from(loop.run(papers, 20), 5);
+    EXPECT_NEAR(median(stuck_rad), config.friction[3] / config.proportional_gain[3], 2e-3) << "the test's own power";
     EXPECT_LE(rms[0], 0.3e-3);
     EXPECT_LE(rms[1], 0.15);  // r: without crossing friction 0.50
     EXPECT_LE(rms.tail<2>().maxCoeff(), 0.2);
@@ -171,42 +167,23 @@ TEST(DynamicLoop, CrossesFrictionAtReversals) {
 
 // However long; before it has ever moved, before it has gone both ways, at speed and when it has settled.
 TEST(DynamicLoop, IsNotFastWhenABlockedJointIsReleased) {
-  for (int joint = 0; joint < 4; ++joint) {
-    for (const double begin_s : {0.0, 0.3, 1.3, 4.0}) {
-      for (const double duration_s : {0.2, 0.7, 3.0}) {
-        SCOPED_TRACE(::testing::Message() << joint << " blocked from " << begin_s << " for " << duration_s);
-        DynamicLoop loop;
-        bool blocked = false;
-        loop.meddle = [&](double time_s, MujocoArm& arm) {
-          const bool wanted = time_s >= begin_s && time_s < begin_s + duration_s;
-          if (wanted == blocked) return;
-          wanted ? arm.block(joint) : arm.release(joint);
-          blocked = wanted;
-        };
-        const auto ticks = loop.run(papers, begin_s + duration_s + 4);
-        Eigen::Vector4d fastest = Eigen::Vector4d::Zero();
-        for (const DynamicTick& tick : ticks) fastest = fastest.cwiseMax(tick.fastest);
-        EXPECT_LE(fastest.cwiseQuotient(loop.controller.limits.rate).maxCoeff(), 1.2);
-        EXPECT_LT(ticks.back().error.tail<3>().cwiseAbs().maxCoeff(), 1);
-      }
+  for (int joint = 0; joint < 4; ++joint)
+    for (const auto& [from_s, for_s] : {std::pair(0.0, 3.0), {0.3, 0.7}, {1.3, 0.2}, {1.3, 3.0}, {4.0, 0.7}}) {
+      const Interval wanted{from_s, from_s + for_s};
+      SCOPED_TRACE(::testing::Message() << joint << " blocked from " << from_s << " for " << for_s);
+      DynamicLoop loop;
+      bool blocked = false;
+      loop.meddle = [&](double time_s, MujocoArm& arm) {
+        if (wanted.contains(time_s) == blocked) return;
+        blocked ? arm.release(joint) : arm.block(joint);
+        blocked = !blocked;
+      };
+      const auto ticks = loop.run(papers, wanted.end_s + 4);
+      Eigen::Vector4d fastest = Eigen::Vector4d::Zero();
+      for (const DynamicTick& tick : ticks) fastest = fastest.cwiseMax(tick.fastest);
+      EXPECT_LE(fastest.cwiseQuotient(loop.controller.limits.rate).maxCoeff(), 1.2);
+      EXPECT_LT(ticks.back().error.tail<3>().cwiseAbs().maxCoeff(), 1);
     }
-  }
-}
-
-// At any time of the trajectory: where its joints are fast, and where they turn and stand still on their friction.
-TEST(DynamicLoop, HoldsWithin100MsOfAPictureThatFreezes) {
-  for (int k = 0; k < 20; ++k) {
-    DynamicLoop loop;
-    const double begin_s = 6 + 0.37 * k, end_s = begin_s + 1;
-    loop.frozen = Interval{begin_s, end_s};
-    const auto ticks = loop.run(papers, end_s + 3);
-    for (const DynamicTick& tick : ticks) {
-      if (tick.time_s > begin_s + 0.1 && tick.time_s < end_s - 1e-9) {
-        EXPECT_EQ(tick.decision.control.reason, HoldReason::frozen_image) << begin_s << ' ' << tick.time_s;
-      }
-    }
-    EXPECT_LT(ticks.back().error.tail<3>().cwiseAbs().maxCoeff(), 1);
-  }
 }
 
 // Holds until an image gives the instrument's place; the rest is the desired motion of that time.
@@ -246,16 +223,6 @@ TEST(DynamicLoop, DoesNotOvershootWhileTheDelayIsUnknown) {
     }
     EXPECT_LE(rms_from(ticks, 5).tail<3>().maxCoeff(), 1);
   }
-}
-
-// Its servos are a quarter as stiff: it hangs below its setpoints by more than the following-error limit.
-TEST(DynamicLoop, AnArmThatHangsLowIsNotTakenForBlocked) {
-  DynamicLoop loop;
-  loop.arm_config.proportional_gain[2] /= 4;
-  loop.arm_config.derivative_gain[2] /= 2;
-  loop.arm_config.friction[2] /= 4;
-  const auto ticks = loop.run(papers, 10);
-  EXPECT_LE(rms_from(ticks, 6).tail<3>().maxCoeff(), 1);
 }
 
 // The tip's errors against a circle of 5 mm at 5 mm/s, from its third second on: across the line of sight [m], and in
@@ -304,7 +271,7 @@ bool never_held(const std::vector<DynamicTick>& ticks, double from_s) {
 TEST(DynamicLoop, TheTipDrawsACircleWhereItWasAskedWhateverTheRegistrationIsOffBy) {
   Tool straight;  // a rod that ends behind the marker
   straight.place.emplace().base_in_marker_m = {0, 0, 0.045};
-  for (const std::uint64_t seed : {1, 2, 3, 4, 5}) {
+  for (const std::uint64_t seed : {1, 2}) {
     DynamicLoop loop = loop_of(straight, seed);
     const auto goal_m = [centre_m = first_tip_m(loop)](double time_s) -> Eigen::Vector3d {
       constexpr double radius_m = 5e-3, speed_m_s = 5e-3;
@@ -321,7 +288,7 @@ TEST(DynamicLoop, TheTipDrawsACircleWhereItWasAskedWhateverTheRegistrationIsOffB
 
 // By half a radian within two seconds, and back.
 TEST(DynamicLoop, TheTipStaysWhereItIsWhileTheWristMoves) {
-  for (const std::uint64_t seed : {1, 2, 3}) {
+  for (const std::uint64_t seed : {1, 2}) {
     DynamicLoop loop = loop_of(placed_tool(), seed);
     loop.wrist_rad = [](double time_s) {
       const double there = MinimumJerk::position(std::clamp((time_s - 6) / 2, 0.0, 1.0)),
@@ -336,5 +303,4 @@ TEST(DynamicLoop, TheTipStaysWhereItIsWhileTheWristMoves) {
   }
 }
 
-}  // namespace
-}  // namespace lapservo::testing
+}  // namespace lapservo::testing::dynamic_loop_test

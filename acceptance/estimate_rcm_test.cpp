@@ -12,9 +12,7 @@
 #include "lapservo/core/random.h"
 #include "lapservo/rig/rig.h"
 
-namespace lapservo {
-using namespace internal;
-namespace {
+namespace lapservo::internal::estimate_rcm_test {
 using lapservo::testing::read_file;
 using lapservo::testing::write_file;
 
@@ -118,5 +116,4 @@ TEST_F(EstimateRcm, ExitsWithOneWhenThereIsNone) {
   expect_in(output(), "parallel");
 }
 
-}  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal::estimate_rcm_test

@@ -18,9 +18,8 @@
 #include "lapservo/sim/tissue.h"
 #include "lapservo/testing/scenes.h"
 
-namespace lapservo::acceptance {
+namespace lapservo::acceptance::hidden_boundaries_test {
 using namespace internal;
-namespace {
 
 constexpr double mm = 1e-3;
 constexpr double steepest_rad = 0.35;
@@ -121,5 +120,4 @@ TEST_F(HiddenBoundaries, OfExactPrintsAreNotGuessedEither) {
   EXPECT_LE(rms(all.errors_sigmas), 2);
 }
 
-}  // namespace
-}  // namespace lapservo::acceptance
+}  // namespace lapservo::acceptance::hidden_boundaries_test

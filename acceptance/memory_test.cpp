@@ -9,8 +9,7 @@
 #include "acceptance/frame_sets.h"
 #include "lapservo/vision/tracker.h"
 
-namespace lapservo::acceptance {
-namespace {
+namespace lapservo::acceptance::memory_test {
 
 double resident_mb() {
   std::ifstream file("/proc/self/statm");
@@ -42,5 +41,4 @@ TEST(Memory, IsFlatOverManyFrames) {
   EXPECT_LT(resident_mb(), settled_mb + 2);
 }
 
-}  // namespace
-}  // namespace lapservo::acceptance
+}  // namespace lapservo::acceptance::memory_test

@@ -21,9 +21,7 @@
 #include "acceptance/tool_test.h"
 #include "lapservo/core/csv.h"
 
-namespace lapservo {
-using namespace internal;
-namespace {
+namespace lapservo::internal::mistakes_test {
 namespace fs = std::filesystem;
 using lapservo::testing::read_file;
 using lapservo::testing::write_file;
@@ -304,5 +302,4 @@ TEST_F(Mistakes, AreNamedWithTheirRemedyByTheCommandThatMeetsThemFirst) {
   std::printf("%zu mistakes; %d of %d commands name cause and remedy\n", all.size(), named, commands);
 }
 
-}  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal::mistakes_test

@@ -12,8 +12,7 @@
 #include "lapservo/io/image_file.h"
 #include "lapservo/testing/input_error.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::opencv_codecs_test {
 using Bytes = std::vector<std::uint8_t>;
 
 constexpr std::uint64_t seed = 61;
@@ -97,5 +96,4 @@ TEST(Decoding, OfWebPWithLossIsAsNearToTheOriginalAsOpenCvs) {
   }
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::opencv_codecs_test

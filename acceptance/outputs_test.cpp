@@ -17,8 +17,7 @@
 #include "lapservo/testing/process.h"
 #include "lapservo/testing/wait_for.h"
 
-namespace lapservo {
-namespace {
+namespace lapservo::internal::outputs_test {
 namespace fs = std::filesystem;
 using testing::read_file;
 using testing::write_file;
@@ -330,5 +329,4 @@ TEST_F(Outputs, StandardOutputIsWrittenIntoWhereverItGoes) {
   EXPECT_EQ(lines_in("closed.csv"), 3);
 }
 
-}  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal::outputs_test

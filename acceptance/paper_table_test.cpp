@@ -12,8 +12,7 @@
 #include "lapservo/testing/sample_frames.h"
 #include "lapservo/testing/temporary_folder.h"
 
-namespace lapservo {
-namespace {
+namespace lapservo::internal::paper_table_test {
 namespace fs = std::filesystem;
 
 // Without blanks and backticks at their ends.
@@ -66,5 +65,4 @@ TEST(ArmTable, NamesOnlyWhatThereIs) {
   EXPECT_GT(names, 60);
 }
 
-}  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal::paper_table_test

@@ -14,9 +14,8 @@
 #include "acceptance/tally.h"
 #include "lapservo/core/random.h"
 
-namespace lapservo::acceptance {
+namespace lapservo::acceptance::prints_test {
 using namespace internal;
-namespace {
 
 constexpr double mm = 1e-3;
 constexpr double steepest_rad = 0.35;
@@ -146,5 +145,4 @@ TEST_F(Prints, WithinTheToleranceAreFound) {
   EXPECT_LE(rms(all.errors_sigmas), 2);
 }
 
-}  // namespace
-}  // namespace lapservo::acceptance
+}  // namespace lapservo::acceptance::prints_test

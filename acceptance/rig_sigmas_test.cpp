@@ -25,9 +25,8 @@
 #include "lapservo/testing/scenes.h"
 #include "lapservo/vision/tracker.h"
 
-namespace lapservo::acceptance {
+namespace lapservo::acceptance::rig_sigmas_test {
 using namespace internal;
-namespace {
 
 using testing::seeds_from_environment;
 
@@ -254,5 +253,4 @@ TEST(RigSigmas, OfALaboratorysOwnCalibrationsAreInQ) {
   row.pose.expect(0.2, 1.4);
 }
 
-}  // namespace
-}  // namespace lapservo::acceptance
+}  // namespace lapservo::acceptance::rig_sigmas_test

@@ -39,8 +39,7 @@
 #include "web/test_http.h"
 #endif
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::wire_loop_test {
 using testing::sleep;
 using testing::wait_for;
 
@@ -702,5 +701,4 @@ TEST_P(FirstWireLoop, WithoutARegistrationItStartsFromTheRcmsImage) {
   end();
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::wire_loop_test

@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::camera_test {
 
 TEST(Camera, HasAName) {
   for (const char* camera : {"0", "12", "/dev/video0", "/dev/video12", "gst:videotestsrc", "gst:"})
@@ -26,5 +25,4 @@ TEST(Camera, ADeviceIsAPipelineAndAPipelineItself) {
   EXPECT_EQ(camera_pipeline("/dev/video\" ! fakesink", {}).find("v4l2src device=\"/dev/video\\\" ! fakesink\" ! "), 0u);
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::camera_test

@@ -10,8 +10,7 @@
 #include "cameras/camera.h"
 #include "lapservo/testing/temporary_folder.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::colours_test {
 
 using Rgb = std::array<int, 3>;
 constexpr std::array<Rgb, 4> colours{Rgb{255, 0, 0}, {0, 255, 0}, {0, 0, 255}, {128, 128, 128}};
@@ -146,5 +145,4 @@ TEST(Colours, ChromaLiesWhereTheCapsPutIt) {
   }
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::colours_test

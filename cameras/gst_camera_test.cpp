@@ -17,8 +17,7 @@
 #include "lapservo/testing/temporary_folder.h"
 #include "lapservo/testing/wait_for.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::gst_camera_test {
 using testing::wait_for;
 
 TEST(GstCamera, ImagesCarryTheMonotonicTimeOfTheirCapture) {
@@ -189,5 +188,4 @@ TEST(CameraFrames, EndWhenTheyAreToStopOrTheCameraFails) {
   EXPECT_NE(frames->complaint().find("identity"), std::string::npos) << frames->complaint();
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::gst_camera_test

@@ -17,8 +17,7 @@
 #include "recordings/open_bag.h"
 #include "recordings/test_bags.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::bag_frames_test {
 using testing::BagEntry;
 using testing::input_error;
 
@@ -181,5 +180,4 @@ TEST(BagJoints, OfTwoArmsOnOneTopicAreRefused) {
   }
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::bag_frames_test

@@ -8,8 +8,7 @@
 
 #include "lapservo/testing/input_error.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::bag_topics_test {
 
 class ListedBag : public Bag {
  public:
@@ -72,5 +71,4 @@ TEST(BagTopics, TheArmsMeasuredJoints) {
   EXPECT_NE(no_joints.find("--joint-topic: is /left"), std::string::npos);
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::bag_topics_test

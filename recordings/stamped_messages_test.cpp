@@ -9,8 +9,7 @@
 
 #include "lapservo/core/random.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::stamped_messages_test {
 
 struct Recorded {
   double stamp_s = 0, recorded_s = 0;
@@ -133,5 +132,4 @@ TEST(StampedMessages, AreNoStepsWhereOnlyTheirWayWasSlow) {
   }
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::stamped_messages_test

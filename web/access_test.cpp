@@ -4,8 +4,7 @@
 
 #include "lapservo/core/error.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::access_test {
 
 HttpRequest request(const std::string& method, const std::string& path,
                     std::multimap<std::string, std::string> headers) {
@@ -89,5 +88,4 @@ TEST(Access, KnowsWhatIsThisComputer) {
     EXPECT_THROW(is_loopback(none, "--listen"), InputError) << none;
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::access_test

@@ -13,8 +13,7 @@
 #include "lapservo/testing/rigs.h"
 #include "web/test_http.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::live_page_test {
 
 using lapservo::testing::http;
 using lapservo::testing::http_post;
@@ -380,5 +379,4 @@ TEST(LivePage, EndsWhileSomebodyWaits) {
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(10));
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::live_page_test

@@ -42,8 +42,7 @@
 #include "transports/named_transport.h"
 #include "transports/test_master.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::dvrk_test {
 using testing::sleep;
 using testing::wait_for;
 using SixJoints = Eigen::Matrix<double, 6, 1>;
@@ -784,5 +783,4 @@ TEST_P(Dvrk, TracksWhileEcmMovesTheCamera) {
 INSTANTIATE_TEST_SUITE_P(Over, Dvrk, ::testing::ValuesIn(named_transports()),
                          [](const auto& wire) { return wire.param; });
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::dvrk_test

@@ -7,8 +7,7 @@
 #include "lapservo/calibration/registration/registration_measurement.h"
 #include "lapservo/testing/scenes.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::measured_rig_test {
 
 Rig measured_before() {
   Rig rig = scenes::usual_rig(2);
@@ -90,5 +89,4 @@ TEST(MeasuredRig, HoldsAnotherCamera) {
   EXPECT_EQ(measured_camera(calibration), expected);
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::measured_rig_test

@@ -6,8 +6,7 @@
 
 #include "lapservo/core/random.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::arm_response_test {
 
 constexpr double period_s = 1.0 / 60;
 
@@ -120,5 +119,4 @@ TEST(ArmResponse, KnowsTheLoadOfAJointThatHasGoneBothWays) {
   EXPECT_TRUE(move(0, 1));
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::arm_response_test

@@ -5,8 +5,7 @@
 #include "lapservo/core/error.h"
 #include "lapservo/core/random.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::calibration_motion_test {
 
 constexpr int seed = 20261122;
 constexpr double step_s = 0.01;
@@ -74,5 +73,4 @@ TEST(CalibrationMotion, RefusesATurnWhereThereIsNoRoom) {
   EXPECT_THROW(turn_motion({0, 1.5, 0.1, 0}, limits, "limits.yaml"), InputError);
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::calibration_motion_test

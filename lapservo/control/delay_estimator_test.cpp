@@ -8,8 +8,7 @@
 
 #include "lapservo/core/random.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::delay_estimator_test {
 
 /// Slow motion of all joints, as a trajectory or an approach makes it.
 Eigen::Vector4d joints_at(double time_s) {
@@ -68,7 +67,7 @@ TEST(DelayEstimator, FindsTheDelayWithinHalfAFrame) {
 
 // Images of another arm, and those that are later than any delay that is looked for.
 TEST(DelayEstimator, ImagesThatNoDelayExplainsContradictIt) {
-  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
     SCOPED_TRACE(seed);
     EXPECT_TRUE(estimator_after({.seen = joints_at(0)}, 30, seed).is_contradicted());
     EXPECT_TRUE(estimator_after({.delay_s = 1.5}, 30, seed).is_contradicted());
@@ -78,22 +77,9 @@ TEST(DelayEstimator, ImagesThatNoDelayExplainsContradictIt) {
   }
 }
 
-TEST(DelayEstimator, ErrorsMatchItsSigma) {
-  double squares = 0;
-  constexpr int runs = 40;
-  for (std::uint64_t seed = 1; seed <= runs; ++seed) {
-    const auto found = estimate_after({0.083}, 6, seed);
-    ASSERT_TRUE(found) << "seed " << seed;
-    squares += std::pow((found->delay_s - 0.083) / found->sigma_s, 2);
-  }
-  // Between calibrated and cautious: the allowance for persistent misfit is a margin here, where noise is white.
-  EXPECT_LT(std::sqrt(squares / runs), 1.5);
-  EXPECT_GT(std::sqrt(squares / runs), 0.1);
-}
-
 // With each fault no delay that is found is off by more than its sigma says.
 TEST(DelayEstimator, SigmaHoldsWhereNoDelayExplainsTheImages) {
-  constexpr std::uint64_t runs = 8;
+  constexpr std::uint64_t runs = 5;
   const auto tell = [](const char* name, double size, const Scene& departed) {
     int given = 0, wrong = 0;
     double squares = 0;
@@ -108,7 +94,9 @@ TEST(DelayEstimator, SigmaHoldsWhereNoDelayExplainsTheImages) {
       }
     const double error = std::sqrt(squares / std::max(1, given));
     EXPECT_EQ(wrong, 0) << name << ' ' << size;
-    EXPECT_LT(error, 2.5) << name << ' ' << size << ": 1.4 where it shows, or is as small as noise";
+    EXPECT_LT(error, size > 0 ? 2.5 : 1.5) << name << ' ' << size << ": 1.4 where it shows, or is as small as noise";
+    // The allowance for persistent misfit is a margin where noise is white.
+    EXPECT_GE(error, size > 0 ? 0 : 0.1) << name;
     return given;
   };
   EXPECT_EQ(tell("clean", 0, {}), 2 * runs);
@@ -132,5 +120,4 @@ TEST(DelayEstimator, SaysNothingWithoutMotion) {
   EXPECT_FALSE(DelayEstimator().estimate());
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::delay_estimator_test

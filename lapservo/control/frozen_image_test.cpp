@@ -6,8 +6,7 @@
 
 #include "lapservo/core/random.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::frozen_image_test {
 
 constexpr double frame_s = 1.0 / 30;
 
@@ -124,5 +123,4 @@ TEST(FrozenImage, AJointMayCrossItsPlay) {
     EXPECT_EQ(frozen.add(image_at(time_s, f), history), Verdict::fresh) << time_s;
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::frozen_image_test

@@ -10,8 +10,7 @@
 
 #include "lapservo/control/test_simulator.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::image_response_test {
 
 using testing::Flaws;
 using testing::Moment;
@@ -263,5 +262,4 @@ TEST(Answered, AStartTestsAnew) {
   EXPECT_EQ(response.rate(), ImageResponse::unconfirmed_rate(config.limits));
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::image_response_test

@@ -5,8 +5,7 @@
 #include "lapservo/control/test_simulator.h"
 #include "lapservo/control/tracking_law.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::jacobian_estimator_test {
 
 using testing::TestRig;
 
@@ -166,5 +165,4 @@ TEST_F(JacobianEstimatorOnTheWay, IgnoresAnOutlierButBelievesAStep) {
   EXPECT_LT(relative_error(estimator->at(q).jacobian, before.jacobian, scales), 0.05) << "the Jacobian stays";
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::jacobian_estimator_test

@@ -6,8 +6,7 @@
 
 #include <gtest/gtest.h>
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::motion_follower_test {
 
 using Progress = MotionFollower::Progress;
 constexpr double tick_s = 0.002;
@@ -121,5 +120,4 @@ TEST(MotionFollower, OneWildReadingMovesNothing) {
   for (std::size_t i = 0; i < run.set_points.size(); ++i) EXPECT_EQ(run.set_points[i], other.set_points[i]) << i;
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::motion_follower_test

@@ -13,8 +13,7 @@
 #include "lapservo/core/random.h"
 #include "lapservo/testing/input_error.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::trajectory_test {
 
 /// rate is the derivative of features and acceleration that of rate, at times that are no corners.
 void expect_consistent(const Trajectory& trajectory, double start_s, double end_s) {
@@ -169,5 +168,4 @@ TEST(Trajectory, OfTheTipRefusesOtherUnits) {
   EXPECT_NE(refused({{0, NAN, 0.1}}).find("tip.y_m: is nan, expected a finite number"), std::string::npos);
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::trajectory_test

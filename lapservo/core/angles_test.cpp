@@ -7,8 +7,7 @@
 
 #include "lapservo/testing/seeded_random.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::angles_test {
 
 double angular_distance(double a_rad, double b_rad) {
   return std::abs(std::remainder(a_rad - b_rad, two_pi));
@@ -39,5 +38,4 @@ TEST(Angles, TheEndsOfTheIntervalsBelongToTheirBeginnings) {
   EXPECT_LT(wrap_two_pi(-std::numeric_limits<double>::min()), two_pi);
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::angles_test

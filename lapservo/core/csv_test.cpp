@@ -11,8 +11,7 @@
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/seeded_random.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::csv_test {
 using testing::input_error;
 
 std::string parse_error(std::string_view text) {
@@ -120,5 +119,4 @@ TEST(ParseFinite, TakesTheWholeTextAsOneFiniteNumberOrNothing) {
     EXPECT_EQ(parse_finite(text), std::nullopt) << "'" << text << "'";
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::csv_test

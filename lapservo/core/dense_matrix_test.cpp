@@ -4,8 +4,7 @@
 
 #include "lapservo/core/random.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::dense_matrix_test {
 
 Eigen::MatrixXd random_matrix(int rows, int columns, Random& random) {
   Eigen::MatrixXd matrix(rows, columns);
@@ -44,5 +43,4 @@ TEST(DenseMatrix, WhatHasNoInverseGetsNone) {
   EXPECT_TRUE(inverse_of_symmetric(indefinite).array().isNaN().all());
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::dense_matrix_test

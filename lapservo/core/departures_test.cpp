@@ -11,8 +11,7 @@
 
 #include "lapservo/core/random.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::departures_test {
 
 constexpr Eigen::Index rows = 300, numbers = 4, faults = 6;
 
@@ -126,5 +125,4 @@ TEST(Departures, SeesNothingInADirectionOfX) {
   EXPECT_TRUE(departures.by_seen.allFinite());
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::departures_test

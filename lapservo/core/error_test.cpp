@@ -4,8 +4,7 @@
 
 #include <gtest/gtest.h>
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::error_test {
 
 TEST(InputError, KeepsItsFieldsAsTheyWereGiven) {
   const std::string longer_than_shown(100, 'x');
@@ -26,5 +25,4 @@ TEST(InputError, SaysTheSameOfAnotherSource) {
   EXPECT_STREQ(problem.with_source("mine.yaml").what(), "mine.yaml: rig: is wrong");
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::error_test

@@ -5,8 +5,7 @@
 
 #include <gtest/gtest.h>
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::inplace_vector_test {
 
 TEST(InplaceVector, HoldsWhatWasPushedUntilItIsFullAndCopiesShareNothing) {
   InplaceVector<int, 2> values;
@@ -22,5 +21,4 @@ TEST(InplaceVector, HoldsWhatWasPushedUntilItIsFullAndCopiesShareNothing) {
   EXPECT_EQ(std::vector<int>(values.begin(), values.end()), (std::vector{7, 2}));
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::inplace_vector_test

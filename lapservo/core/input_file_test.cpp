@@ -12,8 +12,7 @@
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::input_file_test {
 namespace fs = std::filesystem;
 
 constexpr std::size_t limit = 1 << 20;
@@ -58,5 +57,4 @@ TEST(ReadInput, WaitsForAPipeButNotForEver) {
   EXPECT_EQ(refusal(pipe), pipe.string() + ": gives nothing for 5 seconds, expected an image");
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::input_file_test

@@ -7,8 +7,7 @@
 
 #include "lapservo/testing/input_error.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::known_keys_test {
 
 const KnownKeys known{{"name"}, {"seam_rad", "hues_deg"}};
 
@@ -50,5 +49,4 @@ TEST(KnownKeys, RefusesWhatHidesSomething) {
   EXPECT_NE(complaint("seam_rad: 1\nsigma_seam_rad: &a [*a]"), "") << "a list of itself";
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::known_keys_test

@@ -7,8 +7,7 @@
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::new_folder_test {
 namespace fs = std::filesystem;
 using testing::input_error;
 using testing::TemporaryFolder;
@@ -45,5 +44,4 @@ TEST(NewFolder, ThatCanNotBeMadeLeavesNothing) {
   EXPECT_EQ(said(""), "output: has no name, expected a folder to write");
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::new_folder_test

@@ -11,8 +11,7 @@
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::output_target_test {
 namespace fs = std::filesystem;
 using testing::input_error;
 using testing::read_file;
@@ -106,5 +105,4 @@ TEST(TemporaryFile, OfAKilledProcessChangesNothingAndIsInNobodysWay) {
   EXPECT_EQ(read_file(folder / "a.csv"), "new");
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::output_target_test

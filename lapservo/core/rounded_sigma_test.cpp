@@ -8,8 +8,7 @@
 
 #include "lapservo/core/random.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::rounded_sigma_test {
 
 TEST(RoundedSigma, HasThreeDigitsAndReadsBackAsWritten) {
   EXPECT_EQ(rounded_sigma(1.23456e-7), 1.23e-7);
@@ -50,5 +49,4 @@ TEST(RoundedBySigma, KeepsWhatHasNoSigma) {
   EXPECT_EQ(rounded_by_sigma(1e300, 1e-300), 1e300);
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::rounded_sigma_test

@@ -8,8 +8,7 @@
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::row_file_test {
 namespace fs = std::filesystem;
 using testing::input_error;
 using testing::read_file;
@@ -65,5 +64,4 @@ TEST(RowFile, TwoRunsDoNotShareAFile) {
   EXPECT_EQ(read_file(folder / "o.csv"), "a,b\n1,2\n");
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::row_file_test

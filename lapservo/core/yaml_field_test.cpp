@@ -9,8 +9,7 @@
 #include "lapservo/testing/has.h"
 #include "lapservo/testing/input_error.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::yaml_field_test {
 using testing::input_error;
 
 YamlField parse(const std::string& yaml) {
@@ -77,5 +76,4 @@ TEST(YamlField, WhatIsLeftOverBetweenDocumentsIsRefused) {
     EXPECT_EQ(input_error([&] { parse(text); }), "") << text;
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::yaml_field_test

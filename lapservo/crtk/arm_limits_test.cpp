@@ -9,8 +9,7 @@
 #include "lapservo/testing/sample_frames.h"
 #include "lapservo/testing/temporary_folder.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::arm_limits_test {
 
 TEST(ArmLimits, TheReadyFilesAreRead) {
   for (const char* name : {"psm-classic.yaml", "psm-si.yaml"}) {
@@ -41,5 +40,4 @@ TEST(ArmLimits, WrongOnesAreRefusedByName) {
     EXPECT_NE(complaint(text).find(said), std::string::npos) << text;
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::arm_limits_test

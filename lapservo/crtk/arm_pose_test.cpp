@@ -8,8 +8,7 @@
 #include "lapservo/crtk/test_transport.h"
 #include "lapservo/geometry/rotation.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::arm_pose_test {
 
 class ArmPoseTest : public ::testing::Test {
  protected:
@@ -122,5 +121,4 @@ TEST_F(ArmPoseTest, TheEndoscopeGoesAsItsArm) {
   EXPECT_LT(moved->rotation.angularDistance(by.rotation), 1e-7);
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::arm_pose_test

@@ -6,8 +6,7 @@
 
 #include "lapservo/crtk/test_transport.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::crtk_arm_test {
 
 using Positions = std::vector<double>;
 
@@ -71,5 +70,4 @@ TEST(CrtkArm, SaysAStateAtEachChangeAndEveryHalfSecond) {
   EXPECT_EQ(transport.sent<OperatingStateMessage>("/A/operating_state").back().stamp_s, transport.stamp_s);
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::crtk_arm_test

@@ -12,8 +12,7 @@
 #include "lapservo/testing/process.h"
 #include "lapservo/testing/wait_for.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::crtk_robot_test {
 using testing::wait_for;
 
 InterlockConfig config_of() {
@@ -122,5 +121,4 @@ TEST(OperatorPresence, IsAButtonThatIsPressedThroughoutAndSaysSo) {
   }
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::crtk_robot_test

@@ -15,8 +15,7 @@
 #include "lapservo/rig/joint_conversion.h"
 #include "lapservo/testing/rigs.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::dvrk_frames_test {
 
 constexpr double right_angle = std::numbers::pi / 2;
 
@@ -133,5 +132,4 @@ TEST(DvrkFrames, BothFilesSayTheSameBaseFrameWhereTheEcmWas) {
   EXPECT_LT((matrix_after(resting, "transform").row(3) - Eigen::RowVector4d(0, 0, 0, 1)).norm(), 1e-12);
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::dvrk_frames_test

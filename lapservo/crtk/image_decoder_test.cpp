@@ -8,8 +8,7 @@
 
 #include "lapservo/io/pictures/png_picture.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::image_decoder_test {
 
 // 4 x 2 pixels, padded rows.
 ImageMessage message_of(const std::string& encoding, std::uint32_t bytes_a_pixel, std::uint32_t padding = 3) {
@@ -194,5 +193,4 @@ TEST(ImageDecoder, CompressedImages) {
   EXPECT_LT(why(decode(message)).size(), 300u);
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::image_decoder_test

@@ -4,8 +4,7 @@
 
 #include <gtest/gtest.h>
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::image_receiver_test {
 
 constexpr double epoch_s = 1.7e9, period_s = 1.0 / 30;
 
@@ -133,5 +132,4 @@ TEST(ImageReceiver, CountsLateAndMissingFrames) {
   EXPECT_EQ(receiver.counts().late, 1);
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::image_receiver_test

@@ -4,8 +4,7 @@
 
 #include <gtest/gtest.h>
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::wrist_history_test {
 
 TEST(WristHistory, HasTheReadingThatCameNearestToATime) {
   const std::vector<std::string> names{"wrist_pitch"};
@@ -22,5 +21,4 @@ TEST(WristHistory, HasTheReadingThatCameNearestToATime) {
   EXPECT_TRUE(history.at({"wrist_pitch", "wrist_yaw"}, 12).empty());
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::wrist_history_test

@@ -10,8 +10,7 @@
 #include "lapservo/core/error.h"
 #include "lapservo/testing/temporary_folder.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::data_file_test {
 namespace fs = std::filesystem;
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
@@ -56,5 +55,4 @@ TEST(DataFile, ARunComesBackAndIsPlotted) {
   EXPECT_THROW(write_data({{0, 1}, {{"short", {1}}}}, folder / "short.csv"), std::logic_error);
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::data_file_test

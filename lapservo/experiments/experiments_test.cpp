@@ -18,8 +18,7 @@
 #include "lapservo/testing/rigs.h"
 #include "lapservo/testing/temporary_folder.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::experiments_test {
 
 constexpr std::uint64_t seed = 73;
 
@@ -235,5 +234,4 @@ TEST(Tracking, StoppedInItsSecondRunKeepsTheFirst) {
     EXPECT_FALSE(row.centerline.empty() && row.surface.empty()) << row.what;
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::experiments_test

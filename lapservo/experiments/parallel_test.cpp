@@ -6,8 +6,7 @@
 
 #include "lapservo/experiments/setup.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::parallel_test {
 
 const KeepGoing always = [](int, int) { return true; };
 
@@ -47,5 +46,4 @@ TEST(InParallel, PassesAnErrorOn) {
   EXPECT_THROW(in_parallel(5, no_worker, always), std::logic_error);
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::parallel_test

@@ -11,8 +11,7 @@
 
 #include "lapservo/testing/seeded_random.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::camera_test {
 
 constexpr std::uint64_t seed = 21;
 
@@ -131,5 +130,4 @@ TEST(Camera, ContainsTheCentresOfItsPixels) {
   EXPECT_FALSE(camera.contains({std::numeric_limits<double>::quiet_NaN(), 5}));
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::camera_test

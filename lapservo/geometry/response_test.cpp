@@ -5,8 +5,7 @@
 
 #include <gtest/gtest.h>
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::response_test {
 
 std::vector<Response> responses() {
   return {{},
@@ -51,5 +50,4 @@ TEST(Response, ATableIsStraightBetweenItsPoints) {
   EXPECT_NEAR(table.value_from_light(0.7), 0.85, 1e-12);
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::response_test

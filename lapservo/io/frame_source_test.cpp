@@ -19,8 +19,7 @@
 #include "lapservo/testing/temporary_folder.h"
 #include "lapservo/testing/videos.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::frame_source_test {
 namespace fs = std::filesystem;
 
 constexpr int frames = testing::video_frames;
@@ -203,5 +202,4 @@ TEST(OpenFrameSource, NamesWhatCanNotBeRead) {
   EXPECT_NE(refusal(std::string(300, 'a')).find("does not exist"), std::string::npos);
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::frame_source_test

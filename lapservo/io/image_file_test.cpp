@@ -19,8 +19,7 @@
 #include "lapservo/testing/temporary_folder.h"
 #include "lapservo/testing/videos.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::image_file_test {
 using Bytes = std::vector<std::uint8_t>;
 using testing::input_error;
 using testing::TemporaryFolder;
@@ -257,5 +256,4 @@ TEST(HasImageExtension, GoesByTheNamesEndInAnyCase) {
     EXPECT_FALSE(has_image_extension(name)) << name;
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::image_file_test

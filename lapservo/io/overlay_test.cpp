@@ -6,8 +6,7 @@
 #include "lapservo/testing/rigs.h"
 #include "lapservo/vision/shaft/shaft_pose.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::overlay_test {
 
 using What = Observation::Refused::What;
 const JointVector q{0.07, 1.57, 0.064, 1.2};
@@ -139,5 +138,4 @@ TEST(Overlay, DrawsWhatReachesFarBeyondThePicture) {
   EXPECT_GT(drawn_near(frame, draw_overlay(frame, rig, {far}), far.refused.edges_raw_px[0], 12), 10);
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::overlay_test

@@ -18,8 +18,7 @@
 #include "lapservo/testing/sample_frames.h"
 #include "lapservo/testing/seeded_random.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::centre_line_test {
 namespace fs = std::filesystem;
 
 constexpr std::uint64_t seed = 41;
@@ -198,5 +197,4 @@ INSTANTIATE_TEST_SUITE_P(Frames, SampleTruth,
                          ::testing::Values("rotation", "illumination", "stress", "two", "tilt", "distorted", "video"),
                          [](const auto& parameter) { return std::string(parameter.param); });
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::centre_line_test

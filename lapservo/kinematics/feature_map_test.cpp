@@ -8,8 +8,7 @@
 #include "lapservo/kinematics/test_models.h"
 #include "lapservo/testing/seeded_random.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::feature_map_test {
 
 constexpr double step_by_joint[4] = {1e-6, 1e-6, 1e-7, 1e-6};
 
@@ -104,5 +103,4 @@ TEST(FeatureMap, IsAbsentWhereItIsUndefined) {
   EXPECT_FALSE(configuration_through(model.camera_from_rcm, model.camera_from_rcm.translation));
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::feature_map_test

@@ -10,8 +10,7 @@
 #include "lapservo/kinematics/test_models.h"
 #include "lapservo/testing/seeded_random.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::tip_kinematics_test {
 
 // Straight, and bent: up to 8 mm beside the axis.
 Rigid3 random_tip(Random& random) {
@@ -77,5 +76,4 @@ TEST(TipKinematics, NothingReachesBehindTheRcmOrPlacesThatAreNone) {
   EXPECT_FALSE(at({INFINITY, 0, 0}));
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::tip_kinematics_test

@@ -12,8 +12,7 @@
 #include "lapservo/kinematics/test_models.h"
 #include "lapservo/testing/seeded_random.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::visibility_test {
 
 constexpr double any_steepness_rad = 1.57;
 
@@ -119,5 +118,4 @@ TEST(Visibility, NoRandomConfigurationWhereNoneIsInView) {
       random_configuration_in_view(model.camera, model.marker, model.camera_from_rcm, wider_than_the_image, random));
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::visibility_test

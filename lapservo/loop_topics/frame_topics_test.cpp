@@ -10,8 +10,7 @@
 #include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/testing/rigs.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::frame_topics_test {
 
 const JointVector there{0.05, 1.57, 0.064, 1.2};
 
@@ -168,5 +167,4 @@ TEST(FrameTopics, ThePosesCovarianceIsThatOfItsSamples) {
   }
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::frame_topics_test

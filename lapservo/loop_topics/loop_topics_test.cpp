@@ -14,8 +14,7 @@
 #include "lapservo/testing/rigs.h"
 #include "lapservo/testing/wait_for.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::loop_topics_test {
 
 const JointVector there{0.05, 1.57, 0.064, 1.2};
 
@@ -299,5 +298,4 @@ TEST(LoopTopics, HearsGoalsOfTheTip) {
   EXPECT_EQ(last.trajectory->tip_at(2)->position_m, Eigen::Vector3d(0.01, 0, 0.1));
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::loop_topics_test

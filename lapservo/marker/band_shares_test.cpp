@@ -4,8 +4,7 @@
 
 #include "lapservo/testing/markers.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::band_shares_test {
 
 TEST(BandShares, AMarkerHasItsOwnAtEachAzimuthAndNotThoseOfAnother) {
   const Marker marker = testing::marker_with({0.0035, 0.0035, 0.017}, {0.01, 0.01, 0.004});
@@ -18,5 +17,4 @@ TEST(BandShares, AMarkerHasItsOwnAtEachAzimuthAndNotThoseOfAnother) {
   }
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::band_shares_test

@@ -20,8 +20,7 @@
 #include "lapservo/testing/markers.h"
 #include "lapservo/testing/seeded_random.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::decoder_test {
 using testing::askew;
 using testing::marker_with;
 using testing::random_linear_marker;
@@ -273,5 +272,4 @@ TEST(TauByLength, ClampsWhatNoBandShowsAndRefusesABandThatStaysAsLong) {
   EXPECT_THROW(tau_by_length_rad(marker, 3, 0.008), std::out_of_range);
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::decoder_test

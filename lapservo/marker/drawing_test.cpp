@@ -28,8 +28,7 @@ extern "C" const char* __lsan_default_suppressions() {  // NOLINT(bugprone-reser
   return "leak:libfontconfig\n";
 }
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::drawing_test {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 using testing::input_error;
@@ -332,5 +331,4 @@ TEST(PrintColour, HasTheHueAndIsPrintable) {
   }
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::drawing_test

@@ -7,8 +7,7 @@
 #include "lapservo/rcm/projected_rcm.h"
 #include "lapservo/rcm/test_lines.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::distinct_lines_test {
 
 constexpr int seed = 91;
 
@@ -59,5 +58,4 @@ TEST(DistinctLines, OfManyNoMoreThanAskedForInLinearTime) {
   EXPECT_LT(many, 24 * few) << "eight times the lines: 8 times when linear, 64 when quadratic";
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::distinct_lines_test

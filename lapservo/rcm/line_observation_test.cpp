@@ -4,8 +4,7 @@
 
 #include <gtest/gtest.h>
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::line_observation_test {
 
 TEST(LineObservation, ToldApartFromWhatIsNone) {
   EXPECT_TRUE(is_usable(line_between({0, 0}, {100, 50}, 1)));
@@ -15,5 +14,4 @@ TEST(LineObservation, ToldApartFromWhatIsNone) {
   EXPECT_FALSE(is_usable(line_between({0, 0}, {100, 50}, NAN)));
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::line_observation_test

@@ -4,8 +4,7 @@
 
 #include "lapservo/rcm/test_lines.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::pairwise_mean_test {
 
 TEST(PairwiseMean, IsExactWithoutNoise) {
   testing::SeededRandom random(63);
@@ -53,5 +52,4 @@ TEST(PairwiseMean, NeedsTwoLinesThatMeet) {
   EXPECT_FALSE(mean_of_intersections(parallel));
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::pairwise_mean_test

@@ -12,8 +12,7 @@
 #include "lapservo/rcm/pairwise_mean.h"
 #include "lapservo/rcm/test_lines.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::projected_rcm_test {
 
 using Lines = std::vector<LineObservation>;
 constexpr double fan_rad = 0.9;
@@ -262,5 +261,4 @@ TEST(ProjectedRcm, SaysWhyThereIsNone) {
   }
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::projected_rcm_test

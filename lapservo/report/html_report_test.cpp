@@ -5,8 +5,7 @@
 #include "lapservo/io/image_file.h"
 #include "lapservo/report/test_markup.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::html_report_test {
 
 Report sample_report(const std::string& word = "word") {
   ReportSection section;
@@ -94,5 +93,4 @@ TEST(HtmlReport, SaysAtTheTopThatItIsNotWhole) {
   EXPECT_LT(html.find("stopped in the middle"), html.find("class=\"words\"")) << "before the first figure";
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::html_report_test

@@ -9,8 +9,7 @@
 #include "lapservo/testing/temporary_folder.h"
 #include "lapservo/tool/test_tools.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::calibration_record_test {
 
 using lapservo::testing::write_file;
 
@@ -84,5 +83,4 @@ TEST(CalibrationRecord, ARigIsAnotherOnceAFileThatItNamesIs) {
   EXPECT_EQ(content_state(rig), content);
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::calibration_record_test

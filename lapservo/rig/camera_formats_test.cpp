@@ -10,8 +10,7 @@
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::camera_formats_test {
 
 constexpr auto opencv = R"(%YAML:1.0
 ---
@@ -131,5 +130,4 @@ TEST(CameraFormats, OfCamerasThatAreNotModelledAreRefused) {
   expect_remedy(replaced(ros2, "0.0]\nk:", "0.3]\nk:"), "rational");
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::camera_formats_test

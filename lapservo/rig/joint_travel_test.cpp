@@ -4,8 +4,7 @@
 
 #include <gtest/gtest.h>
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::joint_travel_test {
 
 const Joints joints{{"yaw", "pitch", "insertion", "roll"}, {1, 1, 1, 1}, {}};
 
@@ -28,5 +27,4 @@ TEST(JointTravel, NamesWhatStoodStillAndHowFarItMustMove) {
   EXPECT_EQ(still_joints(joints, {{}, {0.1, 0.1, 0.005, 0.2}}), "");
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::joint_travel_test

@@ -7,8 +7,7 @@
 #include "lapservo/core/random.h"
 #include "lapservo/geometry/rotation.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::registration_covariance_test {
 
 using Covariance = Eigen::Matrix<double, 6, 6>;
 
@@ -45,5 +44,4 @@ TEST(RegistrationCovariance, IsTheRigsWhereItHasOneAndZeroWithoutSigmas) {
   EXPECT_EQ(registration_covariance(instrument), *instrument.registration_covariance);
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::registration_covariance_test

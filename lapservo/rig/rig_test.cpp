@@ -16,8 +16,7 @@
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::rig_test {
 namespace fs = std::filesystem;
 using testing::input_error;
 
@@ -330,5 +329,4 @@ TEST(Rig, WithWhichNothingCanBeSeenIsRefused) {
   expect_refused([](Rig& rig) { rig.instruments[0].camera_from_rcm->translation.x() = none; });
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::rig_test

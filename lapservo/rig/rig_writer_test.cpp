@@ -16,8 +16,7 @@
 #include "lapservo/testing/temporary_folder.h"
 #include "lapservo/tool/test_tools.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::rig_writer_test {
 using testing::has;
 using testing::input_error;
 
@@ -176,5 +175,4 @@ TEST(RigWriter, ReplacesNoFileOfACameraOrATool) {
     EXPECT_NO_THROW(refuse_part_over_rig(folder / place, "camera"));
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::rig_writer_test

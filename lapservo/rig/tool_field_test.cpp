@@ -9,8 +9,7 @@
 #include "lapservo/testing/temporary_folder.h"
 #include "lapservo/tool/test_tools.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::tool_field_test {
 using testing::has;
 using testing::input_error;
 
@@ -96,5 +95,4 @@ TEST(ToolField, RefusesWhatIsImplausible) {
   EXPECT_TRUE(has(error_of("nowhere.json"), "nowhere.json"));
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::tool_field_test

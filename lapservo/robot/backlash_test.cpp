@@ -6,8 +6,7 @@
 
 #include "lapservo/core/random.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::backlash_test {
 
 TEST(Backlash, KeepsTheInstrumentWithinTheGap) {
   Random random(1);
@@ -33,5 +32,4 @@ TEST(Backlash, FollowsAWidthThatChanges) {
   EXPECT_EQ(backlash.instrument(0.2), 0.7 + 0.1) << "beyond it";
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::backlash_test

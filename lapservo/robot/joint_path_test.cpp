@@ -4,8 +4,7 @@
 
 #include "lapservo/core/random.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::joint_path_test {
 
 constexpr double period_s = 1.0 / 60;
 const Eigen::Vector4d rate(0.4, 0.4, 0.04, 1.5), acceleration(2, 2, 0.2, 7.5);
@@ -52,5 +51,4 @@ TEST(JointPath, GoesOnFromAnotherPlaceAsFastAsItWas) {
   EXPECT_EQ(path.at(0.2).velocity, velocity);
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::joint_path_test

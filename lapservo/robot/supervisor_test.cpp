@@ -12,8 +12,7 @@
 
 #include "lapservo/core/random.h"
 
-namespace lapservo {
-namespace {
+namespace lapservo::internal::supervisor_test {
 
 constexpr double tick_s = 0.01;
 const Eigen::Vector4d slow(0.1, -0.1, 0.01, 0.3), at_rest(1e-4, 1e-4, 5e-5, 1e-4);
@@ -222,46 +221,6 @@ TEST(Supervisor, ASilenceCountsFromWhenTheArmWasReadyLast) {
   EXPECT_FALSE(bench.moves(1));
 }
 
-// An arm that is enabled and homed is all right for a moment before it homes.
-TEST(Supervisor, AStartCountsWhenTheArmHasBeenReadyForHalfASecond) {
-  Bench bench(1);
-  bench.operating_state = OperatingState::disabled;
-  bench.pass(1);
-  bench.start();
-  bench.pass(0.1);
-  bench.operating_state = OperatingState::enabled;  // for one reading
-  bench.pass(tick_s);
-  bench.start();
-  bench.pass(tick_s);
-  bench.blocked = Blocked::not_homed;
-  bench.pass(0.5);
-  bench.blocked = Blocked::none;
-  EXPECT_FALSE(bench.moves(2));
-  bench.pulse = Blocked::busy;
-  bench.pass(0.3);
-  bench.start();
-  EXPECT_FALSE(bench.moves(0.15));
-  EXPECT_TRUE(bench.moves(0.3));
-}
-
-TEST(Supervisor, AStopBeatsAStartAndOldStartsAreVoid) {
-  Bench bench(1);
-  bench.supervisor.stop(Commander::page);
-  bench.pass(1);
-  for (const bool stop_first : {true, false}) {
-    if (stop_first) bench.supervisor.stop(Commander::page);
-    bench.start(Commander::page);
-    if (!stop_first) bench.supervisor.stop(Commander::page);
-    EXPECT_FALSE(bench.moves(1));
-  }
-  for (const double since_s : {1.1, -1.1, double{NAN}}) {
-    bench.supervisor.start(Commander::page, bench.now - since_s);
-    EXPECT_FALSE(bench.moves(1)) << since_s;
-  }
-  bench.supervisor.start(Commander::page, bench.now - 0.9);
-  EXPECT_TRUE(bench.moves());
-}
-
 TEST(Supervisor, AHoldDoesNotHideWhatBecomesOfTheArm) {
   Bench bench(1);
   bench.supervisor.stop(Commander::page);
@@ -297,20 +256,6 @@ TEST(Supervisor, WhoHoldsHasToLetGoUnlessTheStartHasForce) {
   bench.supervisor.stop(Commander::topic);
   bench.pass(1);
   EXPECT_TRUE(bench.moves_after_start(Commander::page, true));
-}
-
-TEST(Supervisor, AStartThatWasSaidBeforeTheHoldIsVoid) {
-  Bench bench(1);
-  const double before_s = bench.now;
-  bench.pass(0.3);
-  bench.operating_state = OperatingState::fault;
-  bench.pass(0.1);
-  bench.operating_state = OperatingState::enabled;
-  bench.pass(0.1);
-  bench.supervisor.start(Commander::page, before_s);
-  EXPECT_FALSE(bench.moves(1));
-  bench.start(Commander::page);
-  EXPECT_TRUE(bench.moves(0.8));
 }
 
 TEST(Supervisor, WhatIsReportedNeedsAStart) {
@@ -395,7 +340,8 @@ class Model {
     for (const Commander& who : input.stops) holders_.insert(who);
     bool start = false;
     for (const auto& said : input.starts) {
-      if (!input.stops.empty() || std::abs(now - said.said_s) > config.start_lasts_s || said.said_s < held_s_) continue;
+      if (!input.stops.empty() || !(std::abs(now - said.said_s) <= config.start_lasts_s) || said.said_s < held_s_)
+        continue;
       start = true;
       said.force ? holders_.clear() : static_cast<void>(holders_.erase(said.who));
     }
@@ -441,18 +387,19 @@ SupervisorInput any_input(internal::Random& random, const SupervisorInput& befor
   for (const Commander who : {Commander(Commander::program), Commander(Commander::page), Commander(Commander::topic, 1),
                               Commander(Commander::topic, 2)}) {
     if (happens(0.01)) input.stops.insert(who);
-    if (happens(0.06)) input.starts.push_back({who, input.time_s - random.uniform(0, 1.5), happens(0.1)});
+    const double ago_s = happens(0.1) ? NAN : random.uniform(-1.2, 1.5);
+    if (happens(0.06)) input.starts.push_back({who, input.time_s - ago_s, happens(0.1)});
   }
   return input;
 }
 
-// 10,000 sequences: there is no motion but where the model allows it, and no hold where it does.
+// 1,000 sequences: there is no motion but where the model allows it, and no hold where it does.
 TEST(Supervisor, MovesExactlyWhereTheTableAllowsIt) {
   constexpr std::uint64_t seed = 41;
   internal::Random random(seed);
   const SupervisorConfig config;
   long armed = 0, steps = 0;
-  for (int sequence = 0; sequence < 10000; ++sequence) {
+  for (int sequence = 0; sequence < 1000; ++sequence) {
     SupervisorState state;
     state.phase = SupervisorState::Phase::held;  // what the first start waits for is in tests of its own
     state.tracked = true;
@@ -469,5 +416,4 @@ TEST(Supervisor, MovesExactlyWhereTheTableAllowsIt) {
   EXPECT_GT(armed, steps / 20);
 }
 
-}  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal::supervisor_test

@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::convergence_test {
 
 constexpr double period_s = 0.1;
 
@@ -42,5 +41,4 @@ TEST(Convergence, IsLeftAgain) {
   EXPECT_EQ(convergence.first_s(), 0);
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::convergence_test

@@ -13,8 +13,7 @@
 #include "lapservo/servo/image_window.h"
 #include "lapservo/testing/rigs.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::image_features_test {
 
 const Eigen::Vector4d somewhere(0.05, 1.57, 0.064, 1.2);
 
@@ -115,5 +114,4 @@ TEST(ImageFeatures, TheWindowLiesInThePicture) {
   EXPECT_TRUE(folds);
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::image_features_test

@@ -11,8 +11,7 @@
 #include "lapservo/servo/image_features.h"
 #include "lapservo/testing/rigs.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::moving_camera_test {
 
 const JointVector there{0.05, 1.57, 0.064, 1.2};
 
@@ -177,5 +176,4 @@ TEST(BeforeMovedCamera, TheMotionsUncertaintyIsAdded) {
     EXPECT_LT((sum - told).block(part, part, 3, 3).norm(), 0.05 * told.block(part, part, 3, 3).norm()) << part;
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::moving_camera_test

@@ -3,8 +3,7 @@
 #include <gtest/gtest.h>
 #include <opencv2/imgproc.hpp>
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::picture_repeats_test {
 
 constexpr int width = 320, height = 180;
 
@@ -66,5 +65,4 @@ TEST(PictureRepeats, PicturesOfOtherSizesAreOthers) {
   EXPECT_EQ(repeats.add(cv::Mat()), Repetition::none);
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::picture_repeats_test

@@ -7,8 +7,7 @@
 #include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/testing/rigs.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::registration_fit_test {
 
 const Rig& rig() {
   static const Rig rig = testing::paper_test_rig();
@@ -108,5 +107,4 @@ TEST(RegistrationFit, IsWhereTheSightingsWereTaken) {
   EXPECT_FALSE(fit_registration(rig().camera, instrument.marker, {}, {}));
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::registration_fit_test

@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::run_summary_test {
 
 constexpr double period_s = 0.1;
 
@@ -78,5 +77,4 @@ TEST_F(RunSummaryTest, AContradictedRegistrationIsNoSuccessWhenStrict) {
   EXPECT_TRUE(says("registration_contradicted in 15 of 15 ticks")) << summary.text();
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::run_summary_test

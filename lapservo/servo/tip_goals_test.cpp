@@ -17,8 +17,7 @@
 #include "lapservo/testing/rigs.h"
 #include "lapservo/tool/test_tools.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::tip_goals_test {
 
 const JointVector there{0.05, 1.57, 0.064, 1.2};
 
@@ -398,5 +397,4 @@ TEST_F(Refusals, SayWhatIsMissing) {
   EXPECT_NE(refused({here_m}).find("camera_from_rcm and a method other than uncalibrated"), std::string::npos);
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::tip_goals_test

@@ -7,8 +7,7 @@
 #include "lapservo/core/error.h"
 #include "lapservo/core/random.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::arm_test {
 
 const Eigen::Vector4d start(0.1, 1.5, 0.1, 0);
 
@@ -120,5 +119,4 @@ TEST(Arm, RefusesNonsense) {
   EXPECT_THROW(Arm(ArmConfig{}, {9, 1.5, 0.1, 0}), InputError);
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::arm_test

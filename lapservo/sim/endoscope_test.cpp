@@ -6,8 +6,7 @@
 
 #include "lapservo/core/error.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::endoscope_test {
 
 EndoscopeConfig without_pictures() {
   EndoscopeConfig config;
@@ -73,5 +72,4 @@ TEST(Endoscope, RefusesNonsense) {
   EXPECT_THROW(Endoscope({}, {}, {}, {}, config, 1), InputError);
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::endoscope_test

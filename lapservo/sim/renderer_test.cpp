@@ -14,8 +14,7 @@
 #include "lapservo/sim/tissue.h"
 #include "lapservo/tool/test_tools.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::renderer_test {
 
 Camera small_camera() {
   return {480, 320, 700, 700, 239.5, 159.5, {}, {}};
@@ -244,5 +243,4 @@ TEST(Renderer, AToolHidesTheMarkerOnlyWhereItIsInFrontOfIt) {
   }
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::renderer_test

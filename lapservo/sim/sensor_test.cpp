@@ -7,8 +7,7 @@
 #include "lapservo/sim/optics.h"
 #include "lapservo/sim/test_edge_probe.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::sensor_test {
 
 struct Spread {
   double mean, variance;
@@ -82,5 +81,4 @@ TEST(Optics, BlurHasTheWidthThatWasAskedFor) {
     }
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::sensor_test

@@ -11,8 +11,7 @@
 #include "lapservo/sim/test_edge_probe.h"
 #include "lapservo/testing/sample_frames.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::simulator_test {
 
 // The example's scene, a third as large.
 Rig small_rig() {
@@ -198,5 +197,4 @@ TEST(Simulator, TheFirstJointOfAWristSwings) {
   EXPECT_TRUE(wrist_at(0).empty());
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::simulator_test

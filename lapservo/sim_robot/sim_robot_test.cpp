@@ -8,8 +8,7 @@
 #include "lapservo/testing/rigs.h"
 #include "lapservo/testing/wait_for.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::sim_robot_test {
 
 // Both sides of the topics in memory, on one time that passes as the test says.
 class Room {
@@ -92,5 +91,4 @@ TEST(SimRobot, ObeysStateCommandsAndNothingWhilePaused) {
   EXPECT_GT(room.robot->statistics().count, count + 300);
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::sim_robot_test

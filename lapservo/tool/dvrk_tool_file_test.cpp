@@ -17,8 +17,7 @@
 #include "lapservo/testing/input_error.h"
 #include "lapservo/tool/test_tools.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::dvrk_tool_file_test {
 namespace fs = std::filesystem;
 using testing::has;
 using testing::input_error;
@@ -160,5 +159,4 @@ TEST(DvrkToolFile, EveryOneOfDvrkIsRead) {
   EXPECT_GT(files, 0);
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::dvrk_tool_file_test

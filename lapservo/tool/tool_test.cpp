@@ -12,8 +12,7 @@
 #include "lapservo/testing/input_error.h"
 #include "lapservo/tool/test_tools.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::tool_test {
 using testing::input_error;
 
 using Covariance = TipInMarker::Covariance;
@@ -111,5 +110,4 @@ TEST(TipInCamera, CovarianceIsThatOfFiniteDifferences) {
   EXPECT_TRUE(tip_covariance_in_camera(pose, of_pose, tip).isApprox(expected, 1e-6));
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::tool_test

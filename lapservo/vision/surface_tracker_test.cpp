@@ -17,12 +17,12 @@
 #include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/testing/camera_effects.h"
 #include "lapservo/testing/motion.h"
+#include "lapservo/testing/rigs.h"
 #include "lapservo/testing/shots.h"
 #include "lapservo/vision/colour/blob_search.h"
 #include "lapservo/vision/tracker.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::surface_tracker_test {
 
 using scenes::Shot;
 using scenes::usual_shot;
@@ -68,10 +68,6 @@ Rig measured_rig() {
   MarkerSigmas& sigmas = rig.instruments[0].marker.sigmas;
   sigmas.bands_upper_m = sigmas.bands_lower_m = std::array{1e-5, 1e-5, 1e-5};
   return rig;
-}
-
-Eigen::Vector3d random_direction(Random& random) {
-  return Eigen::Vector3d(random.normal(), random.normal(), random.normal()).normalized();
 }
 
 // The usual rig with its registration off.
@@ -218,7 +214,7 @@ TEST(SurfaceTracker, AWrongRegistrationIsNoWrongRotation) {
     Random random(shot.seed);
     const CentreLine line = shot.line();
     for (const double shift_m : {0.01, 0.04}) {
-      const Observation o = Tracker(moved_by(shift_m * random_direction(random))).track(shot.bgr)[0];
+      const Observation o = Tracker(moved_by(shift_m * testing::random_direction(random))).track(shot.bgr)[0];
       if (o.status != Status::ok) continue;
       ++seen;
       EXPECT_LT(std::abs(wrap_pi(o.tau_rad - line.tau_rad)), std::max(0.05, 5 * o.sigma_tau_rad)) << shift_m;
@@ -340,7 +336,7 @@ TEST(SurfaceTracker, AContradictedRegistrationIsNoMismatchedMarkerWithinABudget)
   int contradicted = 0;
   scenes::for_each_shot(6, [&](const Shot& shot) {
     Random random(shot.seed);
-    const Rig moved = moved_by(3e-3 * random_direction(random));
+    const Rig moved = moved_by(3e-3 * testing::random_direction(random));
     const Status whole = Tracker(moved, {.single = true}).track(shot.bgr)[0].status;
     Tracker tracker(moved);
     Status status = tracker.track(shot.bgr)[0].status;
@@ -648,5 +644,4 @@ TEST(SurfaceTracker, FindsAShaftThatIsHalfOutOfTheFrame) {
   EXPECT_LT(std::sqrt(normalised / found), 1.5);
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::surface_tracker_test

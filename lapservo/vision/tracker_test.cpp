@@ -15,8 +15,7 @@
 #include "lapservo/rig/registration_covariance.h"
 #include "lapservo/testing/scenes.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::tracker_test {
 
 using scenes::usual_shot;
 
@@ -91,5 +90,4 @@ TEST(Tracker, RefusesABudgetOfNothing) {
   EXPECT_THROW(Tracker(Rig{}), InputError) << "put together in a program";
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::tracker_test

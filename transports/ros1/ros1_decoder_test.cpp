@@ -11,8 +11,7 @@
 #include "lapservo/crtk/test_messages.h"
 #include "transports/ros1/ros1_messages.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::ros1_decoder_test {
 
 constexpr double stamp_s = sample_stamp_s;
 
@@ -115,5 +114,4 @@ TEST(Ros1Messages, TellOfTheLoop) {
   for (std::size_t i = 0; i < p.size(); ++i) EXPECT_EQ(camera_wire.P[i], p[i]) << i;
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::ros1_decoder_test

@@ -4,8 +4,7 @@
 
 #include "lapservo/testing/input_error.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::ros1_names_test {
 
 TEST(Ros1Names, Masters) {
   EXPECT_EQ(to_string(master_address("")), "http://localhost:11311");
@@ -24,5 +23,4 @@ TEST(Ros1Names, StandInTheirNamespace) {
     EXPECT_NE(testing::input_error([&] { resolved_ros1_name(wrong, "", "--robot"); }), "") << wrong;
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::ros1_names_test

@@ -6,8 +6,7 @@
 
 #include "lapservo/testing/input_error.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::discovery_test {
 
 using Peers = std::vector<std::string>;
 
@@ -66,5 +65,4 @@ TEST(Discovery, AWarningOfADroppedTypeHasARemedy) {
   EXPECT_FALSE(remedy_of_warning("selected interface \"lo\" is not multicast-capable: disabling multicast"));
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::discovery_test

@@ -47,7 +47,7 @@ std::vector<int> range(int first, int last) {
 // Bursts of two to five messages by a writer of another participant, the next one when the last one came.
 template <typename Message>
 void expect_order(Delivery offered, Message (*numbered)(int)) {
-  constexpr int bursts = 1000;
+  constexpr int bursts = 200;
   Ros2Transport to("to");
   const auto from = node_elsewhere();
   TestInbox<Message> heard;

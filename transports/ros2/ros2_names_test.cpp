@@ -4,8 +4,7 @@
 
 #include "lapservo/testing/input_error.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::ros2_names_test {
 
 TEST(Ros2Names, TopicsAreMangledAsRos2Does) {
   EXPECT_EQ(dds_topic_name("/PSM1/measured_js"), "rt/PSM1/measured_js");
@@ -30,5 +29,4 @@ TEST(Ros2Names, Domains) {
     EXPECT_NE(testing::input_error([&] { domain_id(wrong); }), "") << wrong;
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::ros2_names_test

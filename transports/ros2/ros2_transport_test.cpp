@@ -20,8 +20,7 @@
 #include "transports/ros2/test_dds_peer.h"
 #include "transports/ros2/wire.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::ros2_transport_test {
 
 constexpr double stamp_s = sample_stamp_s;
 
@@ -245,5 +244,4 @@ TEST(Ros2Transport, AStampThatIsNoneIsNotANumber) {
   EXPECT_NEAR(Wire<JointMessage>::read(wire).stamp_s, 6, 1e-8);
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::ros2_transport_test

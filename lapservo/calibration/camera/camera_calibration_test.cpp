@@ -14,8 +14,7 @@
 #include "lapservo/sim/boards.h"
 #include "lapservo/testing/has.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::camera_calibration_test {
 using testing::has;
 
 Camera small_camera() {
@@ -243,5 +242,4 @@ TEST(CalibrateCamera, ReadsCharucoBoards) {
   EXPECT_NEAR(found.camera.cy_px, camera.cy_px, 2);
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::camera_calibration_test

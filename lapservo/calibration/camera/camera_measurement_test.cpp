@@ -9,8 +9,7 @@
 #include "lapservo/sim/boards.h"
 #include "lapservo/testing/rigs.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::camera_measurement_test {
 
 int looked_at(int frames, double fps) {
   BoardRecordings recordings({.columns = 9, .rows = 6}, 30, std::nullopt);
@@ -72,5 +71,4 @@ TEST(MeasureCamera, NamesTheBoardThatIsSeen) {
   EXPECT_NE(refusal.find("--board 9x6"), std::string::npos) << refusal;
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::camera_measurement_test

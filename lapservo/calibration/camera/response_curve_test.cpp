@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::response_curve_test {
 
 ResponseCurve bend() {
   ResponseCurve curve;
@@ -55,5 +54,4 @@ TEST(ResponseCurve, UsualOnesAreWithinAFewSigmasOfTheirMean) {
   }
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::response_curve_test

@@ -10,8 +10,7 @@
 #include "lapservo/testing/scenes.h"
 #include "lapservo/vision/tracker.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::frame_diagnosis_test {
 
 constexpr int frames = 12;
 
@@ -172,5 +171,4 @@ TEST_F(FrameDiagnosisTest, NamesFlawedFramesBeforeAllElse) {
   expect_names(half.text(), "the frames are dark");
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::frame_diagnosis_test

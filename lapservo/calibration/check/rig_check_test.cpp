@@ -13,8 +13,7 @@
 #include "lapservo/testing/has.h"
 #include "lapservo/testing/scenes.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::rig_check_test {
 
 constexpr double fps = 6, delay_s = 0.1;
 constexpr int frames = 108;
@@ -295,5 +294,4 @@ TEST_F(CheckRig, CallsNoRigGoodWhoseRcmMostFramesMiss) {
   expect_first(found_out(rig, few, joints), "in 8 of 8 frames the shaft misses the rig's RCM");
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::rig_check_test

@@ -7,8 +7,7 @@
 #include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/testing/rigs.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::work_space_test {
 
 double mean_of(const SigmaMap& map) {
   double sum = 0;
@@ -51,5 +50,4 @@ TEST(SigmaMaps, TellWhereTheMarkerIsInViewButLost) {
     for (std::size_t i = 0; i < SigmaMap::cells; ++i) EXPECT_FALSE(map.lost[i] && map.sigma_rad[i]);
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::work_space_test

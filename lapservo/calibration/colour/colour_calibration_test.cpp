@@ -12,8 +12,7 @@
 #include "lapservo/testing/has.h"
 #include "lapservo/testing/scenes.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::colour_calibration_test {
 using testing::has;
 
 struct Film {
@@ -135,5 +134,4 @@ TEST_F(CalibrateColour, NamesHuesThatAreNotOne) {
     }
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::colour_calibration_test

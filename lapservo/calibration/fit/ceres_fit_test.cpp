@@ -5,8 +5,7 @@
 
 #include <gtest/gtest.h>
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::ceres_fit_test {
 
 // Rosenbrock's valley, which takes some iterations.
 struct Valley {
@@ -45,5 +44,4 @@ TEST(SolveQuietly, IsLeftByWhatIsThrown) {
   EXPECT_GT(solved({}), 0U) << "the next one";
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::ceres_fit_test

@@ -3,8 +3,7 @@
 #include "lapservo/calibration/marker/print_adjustment.h"
 #include "lapservo/testing/markers.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::print_shape_test {
 
 using lapservo::testing::askew;
 using lapservo::testing::random_marker;
@@ -49,5 +48,4 @@ TEST(PrintShape, SigmasAreThoseOfTheMarkersNumbers) {
   for (Eigen::Index i = 0; i < 9; ++i) EXPECT_NEAR(found[i] / expected[i], 1, 0.006) << i << ": they have three digits";
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::print_shape_test

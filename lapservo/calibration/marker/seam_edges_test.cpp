@@ -10,8 +10,7 @@
 #include "lapservo/testing/camera_effects.h"
 #include "lapservo/testing/scenes.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::seam_edges_test {
 
 // A print with a gap whose middle lies `beside_rad` around the shaft from where it faces the camera.
 struct GapShot {
@@ -121,5 +120,4 @@ TEST(SeamEdges, KnowHowFarCompressionMovesThem) {
   EXPECT_LT(sigmas_px, 1) << "or nothing is known";
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::seam_edges_test

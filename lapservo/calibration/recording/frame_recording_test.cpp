@@ -12,8 +12,7 @@
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/scenes.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::frame_recording_test {
 
 // `check` looks at frames some frames later in another thread.
 TEST(FrameRecording, FramesThatWereShownStayAsTheyAre) {
@@ -67,5 +66,4 @@ TEST(FrameRecording, FramesThatWereReadOtherwiseThanTheyAreTrackedAreRefused) {
   EXPECT_NE(said_of(rig, 1, false, [](Frame& f) { f.is_srgb = true; }).find("is read as sRGB"), std::string::npos);
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::frame_recording_test

@@ -8,8 +8,7 @@
 #include "lapservo/calibration/registration/test_motion.h"
 #include "lapservo/testing/has.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::alignment_test {
 using lapservo::testing::has;
 
 Alignment aligned(const Recorded& data) {
@@ -76,5 +75,4 @@ TEST(Align, RefusesWithoutMotionAndWithAnotherOne) {
   }
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::alignment_test

@@ -19,8 +19,7 @@
 #include "lapservo/testing/has.h"
 #include "lapservo/tool/test_tools.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::tip_test {
 using testing::has;
 
 constexpr std::uint64_t first_seed = 1, last_seed = 20;
@@ -340,5 +339,4 @@ TEST(ToolPlace, ByCalliperIsAsKnownAsItsParts) {
               std::hypot(1e-4, 5e-4, 5e-4), 1e-12);
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::tip_test

@@ -7,8 +7,7 @@
 
 #include <gtest/gtest.h>
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::picture_order_test {
 
 struct Folder {
   std::vector<const char*> in_order;
@@ -47,5 +46,4 @@ TEST(PictureOrder, IsThatOfTheNumbersInTheNames) {
   }
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::picture_order_test

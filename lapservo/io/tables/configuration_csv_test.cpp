@@ -4,8 +4,7 @@
 
 #include "lapservo/testing/input_error.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::configuration_csv_test {
 
 std::vector<Configurations> parse(std::string_view text) {
   Rig rig;
@@ -41,5 +40,4 @@ TEST(ConfigurationCsv, RefusesWhatWouldLeaveAnInstrumentNowhere) {
             "q.csv: rho_m: is 120, expected metres: it looks like millimetres");
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::configuration_csv_test

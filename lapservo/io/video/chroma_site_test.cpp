@@ -11,8 +11,7 @@
 #include "lapservo/testing/temporary_folder.h"
 #include "lapservo/testing/videos.h"
 
-namespace lapservo {
-namespace {
+namespace lapservo::internal::chroma_site_test {
 
 constexpr int side_px = 96;
 const cv::Scalar before(40, 40, 200), after(200, 90, 60);
@@ -137,5 +136,4 @@ const std::vector<Coding> codings{
     {bottom_left, bt709, x264 + "-x264-params chromaloc=4" + p420, "mp4"}};
 INSTANTIATE_TEST_SUITE_P(Of, ChromaSites, ::testing::ValuesIn(codings));
 
-}  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal::chroma_site_test

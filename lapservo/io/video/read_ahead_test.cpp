@@ -5,8 +5,7 @@
 
 #include <gtest/gtest.h>
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::read_ahead_test {
 
 // So many frames of one pixel, then the end or an exception; counts the requests.
 class Counted : public FrameSource {
@@ -79,5 +78,4 @@ TEST(ReadAhead, IsAFewFramesAheadAtMostAndMayBeLeftAtAnyTime) {
   }
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::read_ahead_test

@@ -12,8 +12,7 @@
 #include "lapservo/testing/temporary_folder.h"
 #include "lapservo/testing/videos.h"
 
-namespace lapservo {
-namespace {
+namespace lapservo::internal::video_colours_test {
 using testing::expect_patches;
 using testing::patch_px;
 using testing::patches_of;
@@ -146,5 +145,4 @@ INSTANTIATE_TEST_SUITE_P(
                                          Coding{"-c:v ffv1 -pix_fmt yuv422p", "mkv"},
                                          Coding{"-c:v prores_ks -profile:v 4444 -pix_fmt yuv444p10le", "mov"})));
 
-}  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal::video_colours_test

@@ -12,8 +12,7 @@
 #include "lapservo/testing/temporary_folder.h"
 #include "lapservo/testing/videos.h"
 
-namespace lapservo {
-namespace {
+namespace lapservo::internal::video_times_test {
 using testing::ffmpeg;
 
 struct TimesRead {
@@ -132,5 +131,4 @@ TEST(VideoTimes, OfACutVideoBeginAtTheCut) {
   EXPECT_EQ(times.complaint, "");
 }
 
-}  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal::video_times_test

@@ -10,8 +10,7 @@
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::video_writer_test {
 namespace fs = std::filesystem;
 using testing::input_error;
 using testing::TemporaryFolder;
@@ -58,5 +57,4 @@ TEST(VideoWriter, RefusesWhatCanNotHoldOne) {
   EXPECT_FALSE(fs::exists(folder / "a.xyz"));
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::video_writer_test

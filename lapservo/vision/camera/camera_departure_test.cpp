@@ -11,8 +11,7 @@
 #include "lapservo/vision/model/fine_fit.h"
 #include "lapservo/vision/tracker.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::camera_departure_test {
 
 using effects::CameraEffects;
 using scenes::Shot;
@@ -161,5 +160,4 @@ TEST(CameraDeparture, IsKeptWhileTracking) {
   }
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::camera_departure_test

@@ -13,8 +13,7 @@
 #include "lapservo/testing/shots.h"
 #include "lapservo/vision/camera/test_edges.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::picture_processing_test {
 
 using scenes::Shot;
 using scenes::usual_shot;
@@ -282,5 +281,4 @@ TEST(PictureProcessing, IsNotSeenWhereThereIsNone) {
       shots, [](const Shot& shot) { EXPECT_EQ(fit_to(shot, seen_through({}, shot)).processing, Processing::none); });
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::picture_processing_test

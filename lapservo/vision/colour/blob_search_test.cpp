@@ -11,8 +11,7 @@
 #include "lapservo/sim/tissue.h"
 #include "lapservo/testing/seeded_random.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::blob_search_test {
 
 constexpr int width_px = 640, height_px = 480;
 
@@ -155,5 +154,4 @@ TEST(BlobSearch, LooksAtTheGivenPartOnly) {
                                  [](const auto& a, const auto& b) { return a.u == b.u && a.v == b.v; }));
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::blob_search_test

@@ -9,8 +9,7 @@
 #include "lapservo/geometry/response.h"
 #include "lapservo/sim/shaft_lighting.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::colour_classes_test {
 
 using Hues = std::array<double, 3>;
 using Bgr = std::array<std::uint8_t, 3>;
@@ -164,5 +163,4 @@ TEST(ColourClasses, InstrumentsShareTheClassesOfTheirHues) {
   }
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::colour_classes_test

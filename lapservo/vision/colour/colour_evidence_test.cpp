@@ -4,8 +4,7 @@
 
 #include <gtest/gtest.h>
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::colour_evidence_test {
 
 constexpr std::array places{Place::band, Place::shaft, Place::beside};
 
@@ -42,5 +41,4 @@ TEST(ColourEvidence, ShaftIsGreyAndBloodIsNot) {
   EXPECT_EQ(grey_or_other(dark.data()), Shows::grey);
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::colour_evidence_test

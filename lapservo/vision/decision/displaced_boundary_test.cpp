@@ -6,8 +6,7 @@
 #include "lapservo/testing/shots.h"
 #include "lapservo/vision/decision/verification.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::displaced_boundary_test {
 
 using scenes::Shot;
 using scenes::Sight;
@@ -58,5 +57,4 @@ TEST(DisplacedBoundary, IsAskedOfFewLinesOnly) {
   EXPECT_FALSE(may_be_displaced(fit));
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::displaced_boundary_test

@@ -9,8 +9,7 @@
 #include "lapservo/geometry/rotation.h"
 #include "lapservo/testing/scenes.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::fit_observation_test {
 
 using scenes::usual_shot;
 
@@ -73,5 +72,4 @@ TEST(MarkerPose, IsTheConventionsFrame) {
   EXPECT_NEAR(column(camera_from_unrolled, 1).dot(column(pose_at(pi / 2 - 0.7), 0)), 1, 1e-9);
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::fit_observation_test

@@ -7,8 +7,7 @@
 
 #include "lapservo/vision/decision/instrument_memory.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::frame_clock_test {
 
 TEST(FrameClock, GoesOnByTheFramesTimes) {
   FrameClock clock;
@@ -29,5 +28,4 @@ TEST(FrameClock, AlwaysGoesOn) {
   }
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::frame_clock_test

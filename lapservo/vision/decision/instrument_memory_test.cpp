@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::instrument_memory_test {
 
 FineFit fit_at(const JointVector& q) {
   FineFit fit;
@@ -86,5 +85,4 @@ TEST(LookSchedule, AnAnswerEndsThePauses) {
   EXPECT_TRUE(schedule.is_due());
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::instrument_memory_test

@@ -11,8 +11,7 @@
 #include "lapservo/marker/azimuths.h"
 #include "lapservo/testing/shots.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::verification_test {
 
 using scenes::fit_from;
 using scenes::Shot;
@@ -212,5 +211,4 @@ TEST(ClearView, NothingHidesABoundaryButBlood) {
   });
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::verification_test

@@ -11,8 +11,7 @@
 #include "lapservo/testing/shots.h"
 #include "lapservo/vision/edges/edge_blur.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::blurred_boundary_test {
 
 using scenes::Shot;
 
@@ -103,5 +102,4 @@ TEST(BlurredBoundary, FitsToMotionKnowHowSureTheyAre) {
   EXPECT_LT(std::sqrt(squares), 1.5);
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::blurred_boundary_test

@@ -5,8 +5,7 @@
 
 #include <gtest/gtest.h>
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::blurred_edges_test {
 
 // The normal density convolved with `edge` at u, by Simpson's rule in s with t = s^2, which smooths the kink at 0.
 template <typename Edge>
@@ -47,5 +46,4 @@ TEST(BlurredEdges, TheRootsSlopeIsItsDerivative) {
   }
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::blurred_edges_test

@@ -15,8 +15,7 @@
 #include "lapservo/core/random.h"
 #include "lapservo/vision/edges/test_profile.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::edge_lines_test {
 
 using Shape = std::function<double(double)>;  // light at a distance from the edge, 0 to 1
 
@@ -274,5 +273,4 @@ TEST_P(EdgeLines, MayReachTheImagesCorner) {
 INSTANTIATE_TEST_SUITE_P(Shapes, EdgeLines, ::testing::Bool(),
                          [](const auto& chosen) { return chosen.param ? "limb" : "step"; });
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::edge_lines_test

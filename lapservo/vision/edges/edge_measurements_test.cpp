@@ -6,8 +6,7 @@
 
 #include "lapservo/testing/scenes.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::edge_measurements_test {
 
 TEST(EdgeMeasurements, WhatTheLensFoldsIntoTheImageIsNotLookedFor) {
   Rig rig = scenes::usual_rig();
@@ -21,5 +20,4 @@ TEST(EdgeMeasurements, WhatTheLensFoldsIntoTheImageIsNotLookedFor) {
   EXPECT_EQ(edges.sides_in_image, 0);
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::edge_measurements_test

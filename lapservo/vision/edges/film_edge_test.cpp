@@ -8,8 +8,7 @@
 #include "lapservo/core/random.h"
 #include "lapservo/vision/edges/test_profile.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::film_edge_test {
 
 std::vector<FadingPoint> fading(double even_light, double noise, std::uint64_t seed) {
   Random random(seed);
@@ -121,5 +120,4 @@ TEST(FilmShift, ChangesWithTheWidthAsItSays) {
     }
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::film_edge_test

@@ -9,8 +9,7 @@
 #include "lapservo/testing/scenes.h"
 #include "lapservo/vision/tracker.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::interlacing_test {
 
 using scenes::usual_shot;
 
@@ -119,5 +118,4 @@ TEST(Interlacing, TheEvenFieldKeepsItsRowsAndInterpolatesLight) {
   EXPECT_EQ(EvenField(linear).of(last).at<cv::Vec3b>(3, 0)[0], 255);
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::interlacing_test

@@ -6,8 +6,7 @@
 
 #include "lapservo/testing/scenes.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::lens_field_test {
 
 Camera barrel() {
   Camera camera = scenes::usual_rig().camera;
@@ -61,5 +60,4 @@ TEST(LensField, EndsWhereTheImageItselfFolds) {
   }
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::lens_field_test

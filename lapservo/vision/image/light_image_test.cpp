@@ -7,8 +7,7 @@
 
 #include "lapservo/core/random.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::light_image_test {
 
 cv::Mat random_image(std::uint64_t seed, int width_px, int height_px, int highest) {
   Random random(seed);
@@ -112,5 +111,4 @@ TEST(LightImage, ReadsNothingOutsideOfWhatItContains) {
   }
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::light_image_test

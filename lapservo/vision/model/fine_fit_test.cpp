@@ -7,8 +7,7 @@
 
 #include "lapservo/testing/shots.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::fine_fit_test {
 
 using scenes::fit_from;
 using scenes::Shot;
@@ -118,5 +117,4 @@ TEST(FineFit, SigmasGrowWithTheNoise) {
   });
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::fine_fit_test

@@ -5,8 +5,7 @@
 
 #include "lapservo/core/random.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::normal_equations_test {
 
 struct Problem {
   Eigen::MatrixXd rows;
@@ -69,5 +68,4 @@ TEST(NormalEquations, TheCauchyWeightIsThatOfItsLoss) {
   }
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::normal_equations_test

@@ -9,8 +9,7 @@
 #include "lapservo/testing/shots.h"
 #include "lapservo/vision/shaft/rcm_prior.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::centerline_test {
 
 using scenes::Shot;
 using scenes::usual_shot;
@@ -77,5 +76,4 @@ TEST(Centerline, KnowsInstrumentsByTheirOrderOfColours) {
   for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(observations[i].status == Status::ok, i == 0) << i;
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::centerline_test

@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::blob_walk_test {
 
 constexpr double reach_px = 60;
 
@@ -51,5 +50,4 @@ TEST(BlobWalk, BeginsAnewWhereTheBlobItStoppedInIsGone) {
   EXPECT_EQ(walk.start(), 0U);
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::blob_walk_test

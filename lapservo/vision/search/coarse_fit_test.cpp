@@ -8,8 +8,7 @@
 #include "lapservo/kinematics/centre_line.h"
 #include "lapservo/testing/shots.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::coarse_fit_test {
 
 using scenes::Shot;
 using scenes::Sight;
@@ -69,5 +68,4 @@ TEST(CoarseFit, FindsNothingInTissueNorFarFromTheMarker) {
   EXPECT_FALSE(fit_coarsely(shot.sight.scene(), shot.truth(false).changed_by(offset), Rotation::unknown).found);
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::coarse_fit_test

@@ -8,8 +8,7 @@
 
 #include "lapservo/core/random.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::line_segmentation_test {
 
 using Line = std::vector<std::uint8_t>;
 const std::array<std::uint8_t, 3> bands{1, 2, 3};
@@ -102,5 +101,4 @@ TEST(LineSegmentation, SeesNoWholeMarkerInAnotherOrderOfItsColours) {
   }
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::line_segmentation_test

@@ -9,8 +9,7 @@
 #include "lapservo/geometry/rotation.h"
 #include "lapservo/testing/seeded_random.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::rcm_prior_test {
 
 using Six = Eigen::Matrix<double, 6, 1>;
 
@@ -123,5 +122,4 @@ TEST(ConfigurationEstimate, HasTheSpreadOfWhatIsDrawn) {
   for (Eigen::Index i = 0; i < 4; ++i) EXPECT_NEAR(std::sqrt(squares(i, i) / estimate->covariance(i, i)), 1, 0.05) << i;
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::rcm_prior_test

@@ -4,8 +4,7 @@
 
 #include "lapservo/testing/scenes.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::sampled_surface_test {
 
 TEST(LineInImage, ShowsNoPointThatTheLensFoldsIntoTheImage) {
   Rig rig = scenes::usual_rig();
@@ -22,5 +21,4 @@ TEST(LineInImage, ShowsNoPointThatTheLensFoldsIntoTheImage) {
   for (const bool on_shaft : {false, true}) EXPECT_TRUE(shows(ahead, on_shaft) && !shows(aside, on_shaft));
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::sampled_surface_test

@@ -7,8 +7,7 @@
 
 #include "lapservo/testing/scenes.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::shaft_cover_test {
 
 // The marker's pixels, and where it is.
 struct Covered {
@@ -105,5 +104,4 @@ TEST(ShaftCover, MayMeetOnlyWhatIsNear) {
   EXPECT_FALSE(may_meet(rig.camera, marker, first, marker, beside));
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::shaft_cover_test

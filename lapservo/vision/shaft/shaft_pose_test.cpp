@@ -7,8 +7,7 @@
 #include "lapservo/testing/seeded_random.h"
 #include "lapservo/testing/shots.h"
 
-namespace lapservo::internal {
-namespace {
+namespace lapservo::internal::shaft_pose_test {
 
 PoseUnknowns random_unknowns(Random& random) {
   const Eigen::Vector3d axis = scenes::normal_vector(random).normalized();
@@ -56,5 +55,4 @@ TEST(FacingTau, IsThatOfTheCentreLine) {
   });
 }
 
-}  // namespace
-}  // namespace lapservo::internal
+}  // namespace lapservo::internal::shaft_pose_test
