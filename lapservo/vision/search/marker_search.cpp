@@ -65,12 +65,6 @@ bool are_rivals(const FineFit& fit, const FineFit& other) {
   return std::abs(fit.unknowns.change_to(other.unknowns)[psi_unknown]) > Observation::false_rad;
 }
 
-// No marker moves farther from frame to frame.
-double reach_px(const SearchFrame& frame) {
-  constexpr double of_width = 0.05;
-  return of_width * frame.scene.image.width_px;
-}
-
 double cost_of_starts(const SearchFrame& frame, bool through_rcm) {
   return (frame.scene.others.empty() ? 1 : 2) * (through_rcm ? costs.starts : costs.free_starts);
 }
@@ -82,33 +76,29 @@ Starts starts_in(const SearchFrame& frame, bool through_rcm, const Blob& blob, W
   return starts;
 }
 
-// The starts of one blob, until one fits. Rivals are all tried, in one frame.
-Found detect_in_blob(const SearchFrame& frame, bool through_rcm, const Blob& blob, BlobWalk& walk, WorkBudget& budget) {
+// The starts of the next blob, until one fits. Rivals are all tried, in one frame.
+Found detect_in_blob(const SearchFrame& frame, bool through_rcm, BlobWalk& walk, WorkBudget& budget) {
   Found best;
   bool has_rivals = false;
-  const std::size_t first = walk.start();
-  if (!budget.allows(cost_of_starts(frame, through_rcm) + costs.try_start())) {
-    walk.stop(blob, first);
-    return best;
-  }
-  const auto [starts, rivals, other_bands] = starts_in(frame, through_rcm, blob, budget);
+  const std::size_t first = walk.start;
+  walk.stopped = !budget.allows(cost_of_starts(frame, through_rcm) + costs.try_start());
+  if (walk.stopped) return best;
+  const auto [starts, rivals, other_bands] = starts_in(frame, through_rcm, frame.blobs[walk.blob], budget);
   walk.other_bands |= other_bands;
   for (std::size_t i = first; i < starts.size() && (i < rivals || !best.fit); ++i) {
-    if (i > first && i >= rivals && !budget.allows(costs.try_start())) {
-      walk.stop(blob, i);
-      return best;
-    }
+    walk.start = i;
+    walk.stopped = i > first && i >= rivals && !budget.allows(costs.try_start());
+    if (walk.stopped) return best;
     Found found = try_start(frame.scene, frame.light, starts[i], budget);
     if (!found.fit) {
       // A misprint is no reason to look for the marker elsewhere, with a boundary less.
-      if (found.status == Status::marker_mismatch) return walk.finish(blob), found;
+      if (found.status == Status::marker_mismatch) return found;
       if (!best.fit && best.status == Status::no_marker) best = found;  // the likeliest start's refusal stays
       continue;
     }
     has_rivals |= best.fit && are_rivals(*best.fit, *found.fit);
     if (!best.fit || found.fit->misfit() < best.fit->misfit()) best = std::move(found);
   }
-  walk.finish(blob);
   return has_rivals ? refusal(Status::ambiguous, best.fit->unknowns) : best;
 }
 
@@ -130,11 +120,11 @@ Found detect(const SearchFrame& frame, bool through_rcm, BlobWalk& walk, WorkBud
     return found.fit && found.fit->unknowns.through_rcm() && are_apart(frame.scene, *beside, found.fit->unknowns);
   };
   Found best;
-  for (const Blob* blob : walk.rest(frame.blobs, reach_px(frame))) {
-    Found found = detect_in_blob(frame, through_rcm, *blob, walk, budget);
+  for (; walk.blob < frame.blobs.size(); walk.next_blob()) {
+    Found found = detect_in_blob(frame, through_rcm, walk, budget);
     walk.done = counts(found);
     if (walk.done || (!beside && best.status == Status::no_marker)) best = std::move(found);
-    if (walk.done || walk.stopped()) return best;
+    if (walk.done || walk.stopped) return best;
   }
   walk.done = true;
   return best;
@@ -240,16 +230,14 @@ bool MarkerSearch::finish_agreement(const SearchFrame& frame, WorkBudget& budget
 // The best of all that the starts on lines through the RCM lead to.
 Found MarkerSearch::hidden(const SearchFrame& frame, WorkBudget& budget) {
   const std::vector<Blob> blobs = joined_blobs(frame.blobs);
-  const auto rest = hidden_.rest(blobs, reach_px(frame));
   if (agreement_ && !finish_agreement(frame, budget)) return {};
-  for (const Blob* blob : rest) {
-    const auto starts = starts_in(frame, true, *blob, budget).poses;
-    for (std::size_t i = hidden_.start(); i < starts.size(); ++i) {
-      agreement_ = AgreementSearch(starts[i], frame.camera_from_rcm(), frame.scene.marker.length_m());
-      hidden_.stop(*blob, i + 1);
+  for (; hidden_.blob < blobs.size(); hidden_.next_blob()) {
+    const auto starts = starts_in(frame, true, blobs[hidden_.blob], budget).poses;
+    while (hidden_.start < starts.size()) {
+      const PoseUnknowns& start = starts[hidden_.start++];
+      agreement_ = AgreementSearch(start, frame.camera_from_rcm(), frame.scene.marker.length_m());
       if (!finish_agreement(frame, budget)) return {};
     }
-    hidden_.finish(*blob);
   }
   hidden_.done = true;
   if (!candidate_) return {};

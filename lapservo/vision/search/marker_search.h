@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <vector>
 
@@ -8,7 +9,6 @@
 #include "lapservo/vision/image/light_image.h"
 #include "lapservo/vision/model/fine_fit.h"
 #include "lapservo/vision/search/agreement_search.h"
-#include "lapservo/vision/search/blob_walk.h"
 #include "lapservo/vision/search/work_budget.h"
 #include "lapservo/vision/shaft/scene.h"
 #include "lapservo/vision/status.h"
@@ -29,6 +29,18 @@ struct SearchFrame {
   const std::vector<Blob>& blobs;  ///< of the whole frame, largest first
 
   const Rigid3& camera_from_rcm() const { return scene.registration->camera_from_rcm; }
+};
+
+/// How far a search has come through a frame's blobs and the starts of one. Where its time ends first, it goes on in the
+/// frames to come, whose blobs come in about the same order.
+struct BlobWalk {
+  std::size_t blob = 0, start = 0;
+  bool stopped = false;      ///< its time ended
+  bool done = false;         ///< none is left
+  bool other_bands = false;  ///< Starts, of those that were looked at
+
+  bool begun() const { return blob > 0 || start > 0; }
+  void next_blob() { ++blob, start = 0; }
 };
 
 /// The marker near where it is expected, at last without regard to the registration.
