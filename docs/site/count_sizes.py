@@ -7,9 +7,9 @@ import sys
 from pathlib import Path
 
 # folder: lines, chosen numbers
-LIMITS = {"lapservo/vision": (9432, 269)}
+LIMITS = {"lapservo/vision": (9399, 269)}
 TESTS = ["*_test.cpp", "*/test_*.cpp", "*/test_*.h", "lapservo/testing/*", "acceptance/*.cpp", "acceptance/*.h", "fuzz/*.cpp", "fuzz/*.h"]
-MOST_TEST_LINES = 37433
+MOST_TEST_LINES = 37426
 
 NOT_CODE = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\])*"|\'(?:\\.|[^\'\\])\'|^#[^\n]*', re.S | re.M)
 NUMBER = re.compile(r"(?<![\w.])(?:\d[\d']*\.?\d*|\.\d+)(?:[eE][+-]?\d+)?[fFuUlL]*(?![\w.])")

@@ -210,20 +210,17 @@ Found MarkerSearch::despite_registration(const SearchFrame& frame, bool plain_is
   return through_rcm.fit ? through_rcm : free;
 }
 
-// The climb, and fits to its results. False when the budget ends first.
+// The climb, and a fit to its result. False when the budget ends first.
 bool MarkerSearch::finish_agreement(const SearchFrame& frame, WorkBudget& budget) {
   if (!agreement_->advance(frame.scene, budget)) return false;
-  if (!results_) results_ = agreement_->results();
-  for (; !results_->empty(); results_->pop_back()) {
-    if (!budget.allows(costs.fit_to_result())) return false;
-    const PoseUnknowns start = agreement_->in_this_frame(frame.scene, results_->back(), budget);
-    const Found found = fitted_from(frame.scene, frame.light, start, {}, budget);
-    if (!found.fit) continue;
-    has_rivals_ |= candidate_ && are_rivals(*candidate_, *found.fit);
-    if (!candidate_ || found.fit->misfit() < candidate_->misfit()) candidate_ = found.fit;
-  }
-  results_.reset();
+  if (!budget.allows(costs.fit_to_result())) return false;
+  Found found;
+  if (const auto result = agreement_->result())
+    found = fitted_from(frame.scene, frame.light, agreement_->in_this_frame(frame.scene, *result, budget), {}, budget);
   agreement_.reset();
+  if (!found.fit) return true;
+  has_rivals_ |= candidate_ && are_rivals(*candidate_, *found.fit);
+  if (!candidate_ || found.fit->misfit() < candidate_->misfit()) candidate_ = found.fit;
   return true;
 }
 
@@ -257,15 +254,10 @@ Found MarkerSearch::look_long(const SearchFrame& frame, bool is_mismatch, bool p
 
 Found MarkerSearch::look_with_rcm(const SearchFrame& frame, WorkBudget& budget) {
   // The result of other blobs was worse than it, and is gone with it.
-  if (candidate_ && lost_candidate(frame, budget))
-    hidden_ = {}, agreement_.reset(), results_.reset(), has_rivals_ = false;
+  if (candidate_ && lost_candidate(frame, budget)) hidden_ = {}, agreement_.reset(), has_rivals_ = false;
   const bool from_the_first = !plain_.begun();
   const WorkBudget::Beyond step = budget.allowed();
-  // Half the budget, or by turns what a start takes, is for what shows plainly.
-  longs_turn_ = searches_long_ && !longs_turn_;
-  const double half = budget.left() / 2, one_start = cost_of_starts(frame, true) + costs.try_start();
-  const double share = !searches_long_ ? budget.left() : longs_turn_ ? half : std::max(half, one_start);
-  Found plain = budget.share(share, longs_turn_ ? WorkBudget::Beyond::none : step,
+  Found plain = budget.share(searches_long_ ? budget.left() / 2 : budget.left(), step,
                              [&](WorkBudget& part) { return detect(frame, true, plain_, part); });
   if (plain.fit) {
     begin_anew(Status::no_marker);
@@ -276,7 +268,7 @@ Found MarkerSearch::look_with_rcm(const SearchFrame& frame, WorkBudget& budget) 
   know(plain);
   if (plain_.done) plain_ = {}, searches_long_ = true;
   if (!searches_long_) return plain;
-  budget.allow(longs_turn_ ? step : WorkBudget::Beyond::none);
+  budget.allow(step);
   Found found = look_long(frame, is_mismatch, plain_is_known, budget);
   if (found.fit || hidden_.done) begin_anew(found.fit ? Status::no_marker : status_);
   if (found.fit || plain.status == Status::no_marker) return found;

@@ -31,8 +31,8 @@ struct SearchFrame {
   const Rigid3& camera_from_rcm() const { return scene.registration->camera_from_rcm; }
 };
 
-/// How far a search has come through a frame's blobs and the starts of one. Where its time ends first, it goes on in the
-/// frames to come, whose blobs come in about the same order.
+/// How far a search has come through a frame's blobs and the starts of one. Where its time ends first, it goes on in
+/// the frames to come, whose blobs come in about the same order.
 struct BlobWalk {
   std::size_t blob = 0, start = 0;
   bool stopped = false;      ///< its time ended
@@ -73,11 +73,9 @@ class MarkerSearch {
   bool other_bands_ = false;           // that look saw bands which the marker has at no azimuth
   BlobWalk plain_, free_, hidden_;
   bool searches_long_ = false;  // what shows plainly was not found
-  bool longs_turn_ = false;
   std::optional<AgreementSearch> agreement_;
-  std::optional<std::vector<PoseUnknowns>> results_;  // of agreement_, that are not fitted to yet; the next is the last
-  std::optional<FineFit> candidate_;                  // the best so far, while others are looked for
-  bool has_rivals_ = false;                           // another rotation is as ok as the candidate's
+  std::optional<FineFit> candidate_;  // the best so far, while others are looked for
+  bool has_rivals_ = false;           // another rotation is as ok as the candidate's
 };
 
 }  // namespace lapservo::internal
