@@ -7,9 +7,9 @@ import sys
 from pathlib import Path
 
 # folder: lines, chosen numbers
-LIMITS = {"lapservo/vision": (9674, 274)}
+LIMITS = {"lapservo/vision": (9374, 266)}
 TESTS = ["*_test.cpp", "*/test_*.cpp", "*/test_*.h", "lapservo/testing/*", "acceptance/*.cpp", "acceptance/*.h", "fuzz/*.cpp", "fuzz/*.h"]
-MOST_TEST_LINES = 37144
+MOST_TEST_LINES = 36988
 
 NOT_CODE = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\])*"|\'(?:\\.|[^\'\\])\'|^#[^\n]*', re.S | re.M)
 NUMBER = re.compile(r"(?<![\w.])(?:\d[\d']*\.?\d*|\.\d+)(?:[eE][+-]?\d+)?[fFuUlL]*(?![\w.])")

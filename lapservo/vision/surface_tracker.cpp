@@ -25,8 +25,7 @@ SurfaceTracker::SurfaceTracker(const Rig& rig, const TrackerOptions& options)
     tracked_.push_back({instrument, classes_.of_bands(i), registration_of(instrument)});
   }
   others_.reserve(tracked_.size());
-  if (tracked_.size() > 1)
-    for (Tracked& it : tracked_) it.cover.reserve(rig.camera), it.beside.reserve(tracked_.size());
+  for (Tracked& it : tracked_) it.beside.reserve(tracked_.size());
   BlurredEdges::instance();  // takes milliseconds, which no frame should
 }
 
@@ -81,7 +80,7 @@ bool SurfaceTracker::remember(const ImageView& image) {
     const auto before = it.seen_before;
     it.seen_before = {fit ? fit->unknowns.pose() : it.found.refused, before[0]};
     if (!fit) continue;
-    it.memory = remembered(it.memory, *fit, !it.beside.empty(), seen_s(it, fit->unknowns));
+    it.memory = remembered(it.memory, *fit, seen_s(it, fit->unknowns));
     if (shows_two_moments(scene_of(image, it), *fit, before)) blended_s_ = now_s_;
   }
   return blended_s_ && now_s_ - *blended_s_ < two_moments_limits.told_for_s;
@@ -96,28 +95,26 @@ void SurfaceTracker::learn_print(Tracked& it) {
     it.print.add(*tau_rad, off ? View::off : shows_the_rigs_print(*it.found.fit) ? View::the_rigs : View::possible);
 }
 
-void SurfaceTracker::cover(Tracked& other, const ShaftPose& pose, WorkBudget& budget) {
-  if (!other.cover.drawn()) {
-    budget.spend(search_costs.cover);
-    other.cover.draw(rig_.camera, other.instrument.marker, other.bands, pose);
-  }
-  others_.push_back(&other.cover);
+// Where it was found, or is expected.
+ShaftPose SurfaceTracker::likely_pose(const Tracked& it) const {
+  return it.found.fit ? it.found.fit->unknowns.pose() : expected_pose(it).pose();
+}
+
+// Where another instrument lies; nullptr where that is not known, as where its registration is not.
+const ShaftCover* SurfaceTracker::cover_of(Tracked& other, bool is_found) const {
+  if (!other.registration || !(other.found.fit || (other.memory && !is_found))) return nullptr;
+  return &other.cover.emplace(rig_.camera, other.instrument.marker, other.bands, likely_pose(other));
 }
 
 // Those that may hide or touch it, found or expected; or only those that were found before it. Whether there are any.
-bool SurfaceTracker::cover_expected(const Tracked& known, WorkBudget& budget, bool only_before) {
-  const auto pose_of = [&](const Tracked& it) {
-    return it.found.fit ? it.found.fit->unknowns.pose() : expected_pose(it).pose();
-  };
-  const ShaftPose pose = pose_of(known);
+bool SurfaceTracker::cover_expected(const Tracked& known, bool only_before) {
+  const Marker& marker = known.instrument.marker;
+  const ShaftPose pose = likely_pose(known);
   others_.clear();
   for (Tracked& other : tracked_) {
-    const bool has_pose = other.found.fit || (other.memory && !only_before);
-    if (&other == &known || !has_pose || !other.registration) continue;
-    const ShaftPose others = pose_of(other);
-    if (may_meet(rig_.camera, known.instrument.marker, pose, other.instrument.marker, others) &&
-        (!only_before || lies_before(others, known.instrument.marker, pose)))
-      cover(other, others, budget);
+    const ShaftCover* const cover = &other == &known ? nullptr : cover_of(other, only_before);
+    if (cover && cover->may_meet(marker, pose) && (!only_before || cover->lies_before(marker, pose)))
+      others_.push_back(cover);
   }
   return !others_.empty();
 }
@@ -125,44 +122,32 @@ bool SurfaceTracker::cover_expected(const Tracked& known, WorkBudget& budget, bo
 // Fits again who was fitted without one that lies before it: where the sides of both meet looks like a boundary.
 void SurfaceTracker::fit_behind(const ImageView& image, const LightImage& light, WorkBudget& budget) {
   for (Tracked& it : tracked_) {
-    if (!it.found.fit || !cover_expected(it, budget, true) || std::ranges::includes(it.beside, others_)) continue;
-    cover_expected(it, budget);
+    if (!it.found.fit || !cover_expected(it, true) || std::ranges::includes(it.beside, others_)) continue;
+    cover_expected(it);
     const Expected expected = it.memory ? it.memory->expected(now_s_) : Expected{};
     it.found = follow(scene_of(image, it), light, it.found.fit->unknowns, expected, budget);
     it.beside = others_;
     if (!it.found.fit) it.beside.clear();  // it is looked for again
-    it.cover.clear(), next_frame_ = true;
+    next_frame_ = true;
   }
 }
 
 // Those that were found, under or beside which the one that is looked for may be.
-void SurfaceTracker::cover_found(const Tracked& lost, const std::vector<Blob>& blobs, WorkBudget& budget) {
+void SurfaceTracker::cover_found(const Tracked& lost, const std::vector<Blob>& blobs) {
   others_.clear();
   if (!lost.registration) return;
   for (Tracked& other : tracked_) {
-    if (&other == &lost || !other.found.fit || !other.registration) continue;
-    const ShaftPose& pose = other.found.fit->unknowns.pose();
-    if (std::ranges::any_of(blobs, [&](const Blob& blob) {
-          return lies_beside(rig_.camera, other.instrument.marker, pose, blob, lost.bands);
-        }))
-      cover(other, pose, budget);
+    const ShaftCover* const cover = &other == &lost ? nullptr : cover_of(other, true);
+    if (cover && std::ranges::any_of(blobs, [&](const Blob& blob) { return cover->lies_beside(blob, lost.bands); }))
+      others_.push_back(cover);
   }
 }
 
-// The parts that others hide matter only where it can't be followed without, or could not last time.
 Found SurfaceTracker::follow_known(const ImageView& image, const LightImage& light, Tracked& known,
                                    WorkBudget& budget) {
-  const InstrumentMemory& memory = *known.memory;
-  const auto follow_it = [&] {
-    known.beside = others_;
-    return follow(scene_of(image, known), light, expected_pose(known), memory.expected(now_s_), budget);
-  };
-  others_.clear();
-  if (memory.among_others) cover_expected(known, budget);
-  Found found = follow_it();
-  if (!found.fit && !memory.among_others && cover_expected(known, budget)) found = follow_it(), next_frame_ = true;
-  if (found.fit) known.cover.clear();  // where it was expected
-  return found;
+  cover_expected(known);
+  known.beside = others_;
+  return follow(scene_of(image, known), light, expected_pose(known), known.memory->expected(now_s_), budget);
 }
 
 // Whether it is not found, or misses the well known RCM: another one may pass through that.
@@ -179,7 +164,7 @@ bool SurfaceTracker::look_for_lost(const ImageView& image, const LightImage& lig
   bool any = false;
   for (Tracked& it : tracked_) {
     if (!is_lost(it)) continue;
-    cover_found(it, blobs, budget);
+    cover_found(it, blobs);
     const bool misses_rcm = it.found.fit.has_value();
     if (!misses_rcm && again && others_ == it.beside) continue;
     if (!misses_rcm && others_ != it.beside) it.search = MarkerSearch(), it.beside = others_;
@@ -193,7 +178,7 @@ bool SurfaceTracker::look_for_lost(const ImageView& image, const LightImage& lig
     });
     any |= found.fit.has_value();
     if (misses_rcm && !found.fit) continue;
-    if (misses_rcm) it.memory.reset(), it.seen_before = {}, it.cover.clear(), it.beside = others_;
+    if (misses_rcm) it.memory.reset(), it.seen_before = {}, it.beside = others_;
     it.found = std::move(found);
   }
   return any;
@@ -202,7 +187,7 @@ bool SurfaceTracker::look_for_lost(const ImageView& image, const LightImage& lig
 // Those that are followed first: the others share what is left of the budget. Without a budget they are looked for
 // again beside those that were found after them: else the next frame does that.
 void SurfaceTracker::find(const ImageView& image, const LightImage& light, WorkBudget& budget) {
-  for (Tracked& it : tracked_) it.cover.clear(), it.found = {};  // all, before one is followed beside the others
+  for (Tracked& it : tracked_) it.found = {};  // all, before one is followed beside the others
   next_frame_ = false;
   for (Tracked& it : tracked_)
     if (it.memory) it.found = follow_known(image, light, it, budget);
@@ -210,7 +195,7 @@ void SurfaceTracker::find(const ImageView& image, const LightImage& light, WorkB
   for (Tracked& it : tracked_) {
     if (it.found.fit) continue;
     next_frame_ |= it.memory.has_value();
-    it.memory.reset(), it.cover.clear();
+    it.memory.reset();
   }
   if (std::ranges::none_of(tracked_, is_lost)) return;
   budget.spend(search_costs.blobs_per_px * image.width_px * image.height_px);

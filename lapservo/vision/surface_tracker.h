@@ -54,17 +54,18 @@ class SurfaceTracker {
     MarkerSearch search{};
     std::vector<const ShaftCover*> beside{};  // others_ of its last fit or search
     Found found{};
-    ShaftCover cover{};  // where somebody wanted it in this frame
+    std::optional<ShaftCover> cover{};  // where it last was in the way of another one
   };
   void find(const ImageView& image, const LightImage& light, WorkBudget& budget);
   Found follow_known(const ImageView& image, const LightImage& light, Tracked& known, WorkBudget& budget);
   static bool is_lost(const Tracked& it);
   bool look_for_lost(const ImageView& image, const LightImage& light, const std::vector<Blob>& blobs,
                      WorkBudget& budget, bool again);
-  bool cover_expected(const Tracked& known, WorkBudget& budget, bool only_before = false);
+  ShaftPose likely_pose(const Tracked& it) const;
+  const ShaftCover* cover_of(Tracked& other, bool is_found) const;
+  bool cover_expected(const Tracked& known, bool only_before = false);
   void fit_behind(const ImageView& image, const LightImage& light, WorkBudget& budget);
-  void cover_found(const Tracked& lost, const std::vector<Blob>& blobs, WorkBudget& budget);
-  void cover(Tracked& other, const ShaftPose& pose, WorkBudget& budget);
+  void cover_found(const Tracked& lost, const std::vector<Blob>& blobs);
   bool remember(const ImageView& image);
   static void learn_print(Tracked& it);
   Observation observed(const ImageView& image, const Tracked& it, bool is_blended) const;

@@ -89,8 +89,7 @@ struct SeenBoundary {
     const Channels of_most = steps.step.abs() / steps.step.abs().maxCoeff();
     const Eigen::Array<bool, 3, 1> shown =
         of_most > believed.least_step && steps.offset_px.abs() < believed.farthest_px;
-    const Channels variance_px2 =
-        believed.floor_px * believed.floor_px + (believed.sigma_px / of_most).square() + steps.gloss_px.square();
+    const Channels variance_px2 = (believed.sigma_px / of_most).square() + steps.gloss_px.square();
     weight = shown.select(variance_px2.inverse(), 0);
     offset_px = shown.select(steps.offset_px, 0);
     const auto raised = [](float light) { return std::pow(light, 1 + believed.exponent_step); };
@@ -144,9 +143,9 @@ Explanation<Numbers> explained(const SeenBoundaries& seen, const Disagreement& a
   out.found = covariance * gradient;
   const double of_all = out.found.dot(gradient);
   out.scatter = (all.squares - of_all) / (all.degrees - Numbers);
-  const double told_scatter = told_of_scatter * std::max(out.scatter, believed.least_told_scatter);
-  out.sigma = (told_scatter * covariance.diagonal()).cwiseSqrt();
-  out.gain = of_all / Numbers / std::max(out.scatter, believed.least_scatter);
+  const double told_scatter = std::max(out.scatter, believed.least_scatter);
+  out.sigma = (told_of_scatter * told_scatter * covariance.diagonal()).cwiseSqrt();
+  out.gain = of_all / Numbers / told_scatter;
   return out;
 }
 

@@ -16,17 +16,17 @@ namespace lapservo::internal {
 struct DepartureLimits {
   int reach_px = 4;  ///< across a boundary
   /// One sigma of where a channel shows a boundary, by its share of the largest change of light: shading and ink move
-  /// weak channels, which are left out below a tenth; and of any.
-  double sigma_px = 0.02, floor_px = 0.01, least_step = 0.1;
+  /// weak channels, which are left out below a tenth.
+  double sigma_px = 0.02, least_step = 0.1;
   double farthest_px = 1;  ///< what is farther from the others is no boundary
   /// Magnifications of lenses, beside 1; exponents of responses, too, and by how much the latter are tried.
   double usual_aberration = 2e-3, usual_exponent = 0.3, exponent_step = -0.1;
   /// Beyond any camera: the border's red and blue 10 px apart, light to the power of 0.5.
   double most_aberration = 0.01, most_exponent = 0.5;
   int least_degrees = 4;
-  /// Squared sigmas: of all by which channels disagree, and left a degree where that is explained (at least, by which
-  /// gains are weighed; of a response at most, or it is specular light).
-  double least_squares = 2.5, least_scatter = 0.3, most_response_scatter = 0.8;
+  /// Squared sigmas: of all by which channels disagree, and left a degree where that is explained: at least, as what
+  /// two degrees leave may be less by chance; and of a response at most, or it is specular light.
+  double least_squares = 2.5, least_scatter = 0.2, most_response_scatter = 0.8;
   /// The gain of one number, by the scatter; and of a response, which must be another besides. Magnifications of clean
   /// images with highlights gain up to 6.3, of a steep marker with crosstalk 9.6; real ones mostly 15 and more.
   double least_gain = 11, least_response_gain = 5.5, least_exponent = 0.06;
@@ -37,7 +37,6 @@ struct DepartureLimits {
   /// A departure's sigma takes in a part of what is left, most of which is common to all frames (exponents of 53 frames
   /// had a standard deviation of 0.008, for 0.028 by all of it), and of a response a part of itself: it is no power.
   double told_of_scatter = 0.5, told_of_response_scatter = 0.2, doubted_of_response = 0.03;
-  double least_told_scatter = 0.2;  ///< of the whole: what two degrees leave may be less by chance
 };
 inline constexpr DepartureLimits departure_limits;
 

@@ -16,9 +16,8 @@ Expected InstrumentMemory::expected(double at_s) const {
   return expected;
 }
 
-InstrumentMemory remembered(const std::optional<InstrumentMemory>& before, const FineFit& fit, bool among_others,
-                            double time_s) {
-  InstrumentMemory memory{time_s, fit, before ? before->looks : LookSchedule{}, among_others};
+InstrumentMemory remembered(const std::optional<InstrumentMemory>& before, const FineFit& fit, double time_s) {
+  InstrumentMemory memory{time_s, fit, before ? before->looks : LookSchedule{}};
   fit.asked ? memory.looks.looked(fit.processing, fit.processing_explained > 0) : memory.looks.passed();
   if (before && before->fit.unknowns.through_rcm() == fit.unknowns.through_rcm()) {
     memory.step = before->fit.unknowns.change_to(fit.unknowns);

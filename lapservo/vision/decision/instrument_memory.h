@@ -61,7 +61,6 @@ struct InstrumentMemory {
   double time_s;
   FineFit fit;
   LookSchedule looks;
-  bool among_others = false;             ///< it may touch or cross another instrument
   PoseVector step = PoseVector::Zero();  ///< of the unknowns, from the frame before
   double step_s = 0;                     ///< which took so long; 0 where none was found before
 
@@ -71,8 +70,7 @@ struct InstrumentMemory {
 };
 
 /// After a frame in which it was found.
-InstrumentMemory remembered(const std::optional<InstrumentMemory>& before, const FineFit& fit, bool among_others,
-                            double time_s);
+InstrumentMemory remembered(const std::optional<InstrumentMemory>& before, const FineFit& fit, double time_s);
 
 /// The evidence of a run's frames about a print.
 struct PrintRecordLimits {

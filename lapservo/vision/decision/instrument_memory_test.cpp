@@ -14,8 +14,8 @@ constexpr double psi_0_rad = 0.3, psi_1_rad = 0.4;
 
 // Found in two frames that were taken 40 ms apart.
 InstrumentMemory moving() {
-  const InstrumentMemory first = remembered(std::nullopt, fit_at({0.1, 1.5, 0.06, psi_0_rad}), false, 10);
-  return remembered(first, fit_at({0.1, 1.5, 0.065, psi_1_rad}), false, 10.04);
+  const InstrumentMemory first = remembered(std::nullopt, fit_at({0.1, 1.5, 0.06, psi_0_rad}), 10);
+  return remembered(first, fit_at({0.1, 1.5, 0.065, psi_1_rad}), 10.04);
 }
 
 TEST(InstrumentMemory, ExpectsAnInstrumentToMoveOn) {
@@ -33,10 +33,9 @@ TEST(InstrumentMemory, ExpectsAnInstrumentToMoveOn) {
 }
 
 TEST(InstrumentMemory, OfOneFrameKnowsNoStep) {
-  const InstrumentMemory memory = remembered(std::nullopt, fit_at({0.1, 1.5, 0.06, psi_0_rad}), true, 10);
+  const InstrumentMemory memory = remembered(std::nullopt, fit_at({0.1, 1.5, 0.06, psi_0_rad}), 10);
   EXPECT_EQ(memory.expected_pose(11).pose().psi_rad, psi_0_rad);
   EXPECT_FALSE(memory.expected(11).moved_on);
-  EXPECT_TRUE(memory.among_others);
 }
 
 int looks_in(int frames, Processing answer, bool fully) {

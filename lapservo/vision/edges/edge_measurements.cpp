@@ -83,10 +83,12 @@ struct Frame {
     line.du = static_cast<float>(direction.x()), line.dv = static_cast<float>(direction.y());
     line.before = before, line.after = after;
     line.blur_px = static_cast<float>(blur_px);
-    const double depth_m = point(generatrix, along_m).z();
-    for (const int at : {0, -before, after})
-      if (scene.hidden(Eigen::Vector2d(line.u_px, line.v_px) + at * Eigen::Vector2d(line.du, line.dv), depth_m))
+    if (scene.others.empty()) return line;
+    for (const int at : {0, -before, after}) {
+      const auto ideal_px = scene.camera.ideal_from_raw(centre_px + at * direction);
+      if (ideal_px && scene.hidden(point(generatrix, along_m).z() * scene.camera.ray_from_ideal(*ideal_px)))
         return std::nullopt;
+    }
     return line;
   }
 };

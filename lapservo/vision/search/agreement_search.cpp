@@ -20,7 +20,7 @@ const Eigen::Vector4d first_steps(0.03, 0.12, 0.006, 0.5);
 const Eigen::Vector4d steps_of_place = first_steps.cwiseProduct(Eigen::Vector4d(1, 1, 1, 0)),
                       steps_of_rotation = first_steps / (1 << halvings_of_place);
 constexpr int rotations = 48;  // of a turn
-constexpr std::size_t most_peaks = 4, most_results = 3;
+constexpr std::size_t most_peaks = 4;
 constexpr std::array depth_scales{nearer_scale * nearer_scale, nearer_scale, 1.0};
 
 // The pose that shows the same in the middle of the marker, at another depth.
@@ -179,7 +179,7 @@ bool AgreementSearch::finish(const Scene& scene, Climb& climb, WorkBudget& budge
 
 // From the best place the rotations that agree better with the colours than those beside them, the best of them last.
 void AgreementSearch::turn(const Scene& scene, WorkBudget& budget) {
-  Climb climb(camera_from_rcm_, place_->unknowns, steps_of_rotation);
+  Climb climb(camera_from_rcm_, best_->unknowns, steps_of_rotation);
   std::array<double, rotations> scores{};
   const auto at = [&](int i) { return scores[static_cast<std::size_t>((i + rotations) % rotations)]; };
   const auto values = [&](int i) -> Eigen::Vector4d { return {0, 0, climb.values[2], two_pi * i / rotations}; };
@@ -193,49 +193,28 @@ void AgreementSearch::turn(const Scene& scene, WorkBudget& budget) {
   std::sort(peaks.begin(), peaks.end(), [](const Climb& a, const Climb& b) { return a.score < b.score; });
   if (peaks.size() > most_peaks) peaks.erase(peaks.begin(), peaks.end() - most_peaks);
   waiting_ = std::move(peaks);
-  turned_ = true;
+  best_.reset(), turned_ = true;
 }
 
 bool AgreementSearch::advance(const Scene& scene, WorkBudget& budget) {
   ++frames_;
-  if (climb_) climb_->score = score_at(scene, *climb_, climb_->values, budget);
   while (true) {
-    if (!climb_ && waiting_.empty()) {
-      if (turned_ || !place_) return true;
+    if (waiting_.empty()) {
+      if (turned_ || !best_) return true;
       if (!budget.allows(rotations * search_costs.agreement)) return false;
       turn(scene, budget);
-      continue;
     }
-    if (!climb_) {
-      climb_ = waiting_.back();
-      waiting_.pop_back();
-      climb_->score = score_at(scene, *climb_, climb_->values, budget);
-    }
-    if (!finish(scene, *climb_, budget)) return false;
-    if (const auto unknowns = climb_->unknowns(climb_->values)) {
-      const Result result{climb_->score, *unknowns};
-      if (turned_)
-        results_.push_back(result);
-      else if (!place_ || result.score > place_->score)
-        place_ = result;
-    }
-    climb_.reset();
+    Climb& climb = waiting_.back();
+    climb.score = score_at(scene, climb, climb.values, budget);
+    if (!finish(scene, climb, budget)) return false;
+    if (const auto unknowns = climb.unknowns(climb.values); unknowns && !(best_ && climb.score <= best_->score))
+      best_ = Result{climb.score, *unknowns};
+    waiting_.pop_back();
   }
 }
 
-std::vector<PoseUnknowns> AgreementSearch::results() const {
-  std::vector<Result> sorted = results_;
-  std::sort(sorted.begin(), sorted.end(), [](const Result& a, const Result& b) { return a.score > b.score; });
-  std::vector<PoseUnknowns> best;
-  for (const Result& result : sorted) {
-    constexpr double same_rad = 2 * Observation::false_rad;  // both may be right
-    const bool known = std::any_of(best.begin(), best.end(), [&](const PoseUnknowns& other) {
-      return std::abs(wrap_pi(other.pose().psi_rad - result.unknowns.pose().psi_rad)) < same_rad;
-    });
-    if (!known && best.size() < most_results) best.push_back(result.unknowns);
-  }
-  std::reverse(best.begin(), best.end());
-  return best;
+std::optional<PoseUnknowns> AgreementSearch::result() const {
+  return best_ ? std::optional(best_->unknowns) : std::nullopt;
 }
 
 PoseUnknowns AgreementSearch::in_this_frame(const Scene& scene, const PoseUnknowns& result, WorkBudget& budget) {

@@ -30,10 +30,10 @@ class AgreementSearch {
   /// Goes on in this frame. Whether it came to its end; false when the budget did first.
   bool advance(const Scene& scene, WorkBudget& budget);
 
-  /// After a search that came to its end: up to three results (of different rotations), the best last.
-  std::vector<PoseUnknowns> results() const;
+  /// After a search that came to its end: what explains most. Nullopt of a start that has no pose through the RCM.
+  std::optional<PoseUnknowns> result() const;
 
-  /// One of them, good to a few pixels in this frame.
+  /// It, good to a few pixels in this frame.
   PoseUnknowns in_this_frame(const Scene& scene, const PoseUnknowns& result, WorkBudget& budget);
 
  private:
@@ -66,9 +66,7 @@ class AgreementSearch {
   int frames_ = 0;
   bool turned_ = false;         // the rotations are looked for
   std::vector<Climb> waiting_;  // the next is the last
-  std::optional<Climb> climb_;
-  std::optional<Result> place_;  // the best of any rotation
-  std::vector<Result> results_;
+  std::optional<Result> best_;  // of any rotation, then of those that are looked for
 };
 
 }  // namespace lapservo::internal

@@ -65,12 +65,6 @@ bool are_rivals(const FineFit& fit, const FineFit& other) {
   return std::abs(fit.unknowns.change_to(other.unknowns)[psi_unknown]) > Observation::false_rad;
 }
 
-// No marker moves farther from frame to frame.
-double reach_px(const SearchFrame& frame) {
-  constexpr double of_width = 0.05;
-  return of_width * frame.scene.image.width_px;
-}
-
 double cost_of_starts(const SearchFrame& frame, bool through_rcm) {
   return (frame.scene.others.empty() ? 1 : 2) * (through_rcm ? costs.starts : costs.free_starts);
 }
@@ -82,33 +76,29 @@ Starts starts_in(const SearchFrame& frame, bool through_rcm, const Blob& blob, W
   return starts;
 }
 
-// The starts of one blob, until one fits. Rivals are all tried, in one frame.
-Found detect_in_blob(const SearchFrame& frame, bool through_rcm, const Blob& blob, BlobWalk& walk, WorkBudget& budget) {
+// The starts of the next blob, until one fits. Rivals are all tried, in one frame.
+Found detect_in_blob(const SearchFrame& frame, bool through_rcm, BlobWalk& walk, WorkBudget& budget) {
   Found best;
   bool has_rivals = false;
-  const std::size_t first = walk.start();
-  if (!budget.allows(cost_of_starts(frame, through_rcm) + costs.try_start())) {
-    walk.stop(blob, first);
-    return best;
-  }
-  const auto [starts, rivals, other_bands] = starts_in(frame, through_rcm, blob, budget);
+  const std::size_t first = walk.start;
+  walk.stopped = !budget.allows(cost_of_starts(frame, through_rcm) + costs.try_start());
+  if (walk.stopped) return best;
+  const auto [starts, rivals, other_bands] = starts_in(frame, through_rcm, frame.blobs[walk.blob], budget);
   walk.other_bands |= other_bands;
   for (std::size_t i = first; i < starts.size() && (i < rivals || !best.fit); ++i) {
-    if (i > first && i >= rivals && !budget.allows(costs.try_start())) {
-      walk.stop(blob, i);
-      return best;
-    }
+    walk.start = i;
+    walk.stopped = i > first && i >= rivals && !budget.allows(costs.try_start());
+    if (walk.stopped) return best;
     Found found = try_start(frame.scene, frame.light, starts[i], budget);
     if (!found.fit) {
       // A misprint is no reason to look for the marker elsewhere, with a boundary less.
-      if (found.status == Status::marker_mismatch) return walk.finish(blob), found;
+      if (found.status == Status::marker_mismatch) return found;
       if (!best.fit && best.status == Status::no_marker) best = found;  // the likeliest start's refusal stays
       continue;
     }
     has_rivals |= best.fit && are_rivals(*best.fit, *found.fit);
     if (!best.fit || found.fit->misfit() < best.fit->misfit()) best = std::move(found);
   }
-  walk.finish(blob);
   return has_rivals ? refusal(Status::ambiguous, best.fit->unknowns) : best;
 }
 
@@ -130,11 +120,11 @@ Found detect(const SearchFrame& frame, bool through_rcm, BlobWalk& walk, WorkBud
     return found.fit && found.fit->unknowns.through_rcm() && are_apart(frame.scene, *beside, found.fit->unknowns);
   };
   Found best;
-  for (const Blob* blob : walk.rest(frame.blobs, reach_px(frame))) {
-    Found found = detect_in_blob(frame, through_rcm, *blob, walk, budget);
+  for (; walk.blob < frame.blobs.size(); walk.next_blob()) {
+    Found found = detect_in_blob(frame, through_rcm, walk, budget);
     walk.done = counts(found);
     if (walk.done || (!beside && best.status == Status::no_marker)) best = std::move(found);
-    if (walk.done || walk.stopped()) return best;
+    if (walk.done || walk.stopped) return best;
   }
   walk.done = true;
   return best;
@@ -220,36 +210,31 @@ Found MarkerSearch::despite_registration(const SearchFrame& frame, bool plain_is
   return through_rcm.fit ? through_rcm : free;
 }
 
-// The climb, and fits to its results. False when the budget ends first.
+// The climb, and a fit to its result. False when the budget ends first.
 bool MarkerSearch::finish_agreement(const SearchFrame& frame, WorkBudget& budget) {
   if (!agreement_->advance(frame.scene, budget)) return false;
-  if (!results_) results_ = agreement_->results();
-  for (; !results_->empty(); results_->pop_back()) {
-    if (!budget.allows(costs.fit_to_result())) return false;
-    const PoseUnknowns start = agreement_->in_this_frame(frame.scene, results_->back(), budget);
-    const Found found = fitted_from(frame.scene, frame.light, start, {}, budget);
-    if (!found.fit) continue;
-    has_rivals_ |= candidate_ && are_rivals(*candidate_, *found.fit);
-    if (!candidate_ || found.fit->misfit() < candidate_->misfit()) candidate_ = found.fit;
-  }
-  results_.reset();
+  if (!budget.allows(costs.fit_to_result())) return false;
+  Found found;
+  if (const auto result = agreement_->result())
+    found = fitted_from(frame.scene, frame.light, agreement_->in_this_frame(frame.scene, *result, budget), {}, budget);
   agreement_.reset();
+  if (!found.fit) return true;
+  has_rivals_ |= candidate_ && are_rivals(*candidate_, *found.fit);
+  if (!candidate_ || found.fit->misfit() < candidate_->misfit()) candidate_ = found.fit;
   return true;
 }
 
 // The best of all that the starts on lines through the RCM lead to.
 Found MarkerSearch::hidden(const SearchFrame& frame, WorkBudget& budget) {
   const std::vector<Blob> blobs = joined_blobs(frame.blobs);
-  const auto rest = hidden_.rest(blobs, reach_px(frame));
   if (agreement_ && !finish_agreement(frame, budget)) return {};
-  for (const Blob* blob : rest) {
-    const auto starts = starts_in(frame, true, *blob, budget).poses;
-    for (std::size_t i = hidden_.start(); i < starts.size(); ++i) {
-      agreement_ = AgreementSearch(starts[i], frame.camera_from_rcm(), frame.scene.marker.length_m());
-      hidden_.stop(*blob, i + 1);
+  for (; hidden_.blob < blobs.size(); hidden_.next_blob()) {
+    const auto starts = starts_in(frame, true, blobs[hidden_.blob], budget).poses;
+    while (hidden_.start < starts.size()) {
+      const PoseUnknowns& start = starts[hidden_.start++];
+      agreement_ = AgreementSearch(start, frame.camera_from_rcm(), frame.scene.marker.length_m());
       if (!finish_agreement(frame, budget)) return {};
     }
-    hidden_.finish(*blob);
   }
   hidden_.done = true;
   if (!candidate_) return {};
@@ -269,15 +254,10 @@ Found MarkerSearch::look_long(const SearchFrame& frame, bool is_mismatch, bool p
 
 Found MarkerSearch::look_with_rcm(const SearchFrame& frame, WorkBudget& budget) {
   // The result of other blobs was worse than it, and is gone with it.
-  if (candidate_ && lost_candidate(frame, budget))
-    hidden_ = {}, agreement_.reset(), results_.reset(), has_rivals_ = false;
+  if (candidate_ && lost_candidate(frame, budget)) hidden_ = {}, agreement_.reset(), has_rivals_ = false;
   const bool from_the_first = !plain_.begun();
   const WorkBudget::Beyond step = budget.allowed();
-  // Half the budget, or by turns what a start takes, is for what shows plainly.
-  longs_turn_ = searches_long_ && !longs_turn_;
-  const double half = budget.left() / 2, one_start = cost_of_starts(frame, true) + costs.try_start();
-  const double share = !searches_long_ ? budget.left() : longs_turn_ ? half : std::max(half, one_start);
-  Found plain = budget.share(share, longs_turn_ ? WorkBudget::Beyond::none : step,
+  Found plain = budget.share(searches_long_ ? budget.left() / 2 : budget.left(), step,
                              [&](WorkBudget& part) { return detect(frame, true, plain_, part); });
   if (plain.fit) {
     begin_anew(Status::no_marker);
@@ -288,7 +268,7 @@ Found MarkerSearch::look_with_rcm(const SearchFrame& frame, WorkBudget& budget) 
   know(plain);
   if (plain_.done) plain_ = {}, searches_long_ = true;
   if (!searches_long_) return plain;
-  budget.allow(longs_turn_ ? step : WorkBudget::Beyond::none);
+  budget.allow(step);
   Found found = look_long(frame, is_mismatch, plain_is_known, budget);
   if (found.fit || hidden_.done) begin_anew(found.fit ? Status::no_marker : status_);
   if (found.fit || plain.status == Status::no_marker) return found;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <vector>
 
@@ -8,7 +9,6 @@
 #include "lapservo/vision/image/light_image.h"
 #include "lapservo/vision/model/fine_fit.h"
 #include "lapservo/vision/search/agreement_search.h"
-#include "lapservo/vision/search/blob_walk.h"
 #include "lapservo/vision/search/work_budget.h"
 #include "lapservo/vision/shaft/scene.h"
 #include "lapservo/vision/status.h"
@@ -29,6 +29,18 @@ struct SearchFrame {
   const std::vector<Blob>& blobs;  ///< of the whole frame, largest first
 
   const Rigid3& camera_from_rcm() const { return scene.registration->camera_from_rcm; }
+};
+
+/// How far a search has come through a frame's blobs and the starts of one. Where its time ends first, it goes on in
+/// the frames to come, whose blobs come in about the same order.
+struct BlobWalk {
+  std::size_t blob = 0, start = 0;
+  bool stopped = false;      ///< its time ended
+  bool done = false;         ///< none is left
+  bool other_bands = false;  ///< Starts, of those that were looked at
+
+  bool begun() const { return blob > 0 || start > 0; }
+  void next_blob() { ++blob, start = 0; }
 };
 
 /// The marker near where it is expected, at last without regard to the registration.
@@ -61,11 +73,9 @@ class MarkerSearch {
   bool other_bands_ = false;           // that look saw bands which the marker has at no azimuth
   BlobWalk plain_, free_, hidden_;
   bool searches_long_ = false;  // what shows plainly was not found
-  bool longs_turn_ = false;
   std::optional<AgreementSearch> agreement_;
-  std::optional<std::vector<PoseUnknowns>> results_;  // of agreement_, that are not fitted to yet; the next is the last
-  std::optional<FineFit> candidate_;                  // the best so far, while others are looked for
-  bool has_rivals_ = false;                           // another rotation is as ok as the candidate's
+  std::optional<FineFit> candidate_;  // the best so far, while others are looked for
+  bool has_rivals_ = false;           // another rotation is as ok as the candidate's
 };
 
 }  // namespace lapservo::internal

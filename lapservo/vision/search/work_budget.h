@@ -59,8 +59,7 @@ struct SearchCosts {
   double free_starts = 500;                ///< the same without the RCM
   double agreement = 12;                   ///< of one pose with the frame's colours
   double blobs_per_px = 2.2e-4;
-  double part_beside = 0.6;  ///< of the budget where every sample is tested for another instrument that hides it
-  double cover = 1300;       ///< where one instrument lies, for who looks for another beside or behind it
+  double part_beside = 0.5;  ///< of the budget where every sample is tested for another instrument that hides it
   double fine_fit() const { return 3 * fine_pass + fine_end; }
   double try_start() const { return coarse_fit + fine_fit(); }
   double fit_to_result() const { return 150 * agreement + fine_fit(); }

@@ -17,7 +17,8 @@ namespace lapservo::internal {
 template <std::size_t Count>
 class LineInImage {
  public:
-  LineInImage(const Scene& scene, const Eigen::Vector3d& base, const Eigen::Vector3d& step) : scene_(scene) {
+  LineInImage(const Scene& scene, const Eigen::Vector3d& base, const Eigen::Vector3d& step)
+      : scene_(scene), base_(base), step_(step) {
     const Camera& camera = scene.camera;
     for (std::size_t k = 0; k < Count; ++k) {
       const double steps = static_cast<double>(k) + 0.5;
@@ -27,7 +28,7 @@ class LineInImage {
     }
     if (!camera.distorted()) return;
     for (std::size_t k = 0; k < Count; ++k) {
-      if (!scene.field.contains(base + (static_cast<double>(k) + 0.5) * step)) depth_m_[k] = 0;
+      if (!scene.field.contains(point(k))) depth_m_[k] = 0;
       const Eigen::Vector2d raw_px = camera.raw_from_ideal({u_px_[k], v_px_[k]});
       u_px_[k] = raw_px.x(), v_px_[k] = raw_px.y();
     }
@@ -40,7 +41,7 @@ class LineInImage {
     const std::uint8_t* const bgr = depth_m_[k] > LensField::nearest_m ? scene_.pixel_at(raw_px) : nullptr;
     if (!bgr || scene_.others.empty()) return bgr;
     const bool is_others = !on_shaft && scene_.class_beside(raw_px) == Scene::outside;
-    return is_others || scene_.hidden(raw_px, depth_m_[k]) ? nullptr : bgr;
+    return is_others || scene_.hidden(point(k)) ? nullptr : bgr;
   }
   /// Colour class of the shaft there, Scene::outside where the image says nothing of it.
   std::uint8_t class_on_shaft(std::size_t k) const {
@@ -49,7 +50,10 @@ class LineInImage {
   }
 
  private:
+  Eigen::Vector3d point(std::size_t k) const { return base_ + (static_cast<double>(k) + 0.5) * step_; }
+
   const Scene& scene_;
+  Eigen::Vector3d base_, step_;
   std::array<double, Count> u_px_, v_px_, depth_m_;
 };
 

@@ -62,10 +62,8 @@ struct Scene {
     const std::uint8_t colour = class_at(raw_px);
     return !others.empty() && explained_by(others, raw_px, colour) ? outside : colour;
   }
-  /// Whether another instrument lies before what would be seen there at this depth (z in the camera's frame).
-  bool hidden(const Eigen::Vector2d& raw_px, double depth_m) const {
-    return !others.empty() && hidden_by(others, raw_px, depth_m);
-  }
+  /// Whether another instrument lies before a point in the camera's frame.
+  bool hidden(const Eigen::Vector3d& point) const { return !others.empty() && hidden_by(others, point); }
   /// Whether the registration shows on which lines of the image the shaft may lie.
   bool knows_rcm() const { return registration && registration->is_within(marker.radius_m()); }
   /// How its rolling shutter, if it has one, shows the marker at a pose.

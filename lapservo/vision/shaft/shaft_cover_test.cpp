@@ -15,11 +15,9 @@ struct Covered {
   ShaftPose pose = scenes::pose_of(shot.rig, 0, shot.q);
   Scene scene = shot.sight.scene();
   std::vector<Blob> blobs = largest_blobs(shot.sight.view(), shot.sight.classes());
-  ShaftCover cover;
+  ShaftCover cover{scene.camera, scene.marker, scene.bands, pose};
 
-  explicit Covered(std::uint64_t seed) : shot(scenes::usual_shot(seed)) {
-    cover.draw(scene.camera, scene.marker, scene.bands, pose);
-  }
+  explicit Covered(std::uint64_t seed) : shot(scenes::usual_shot(seed)) {}
 };
 
 TEST(ShaftCover, ExplainsTheMarkersPixels) {
@@ -29,9 +27,9 @@ TEST(ShaftCover, ExplainsTheMarkersPixels) {
     ASSERT_FALSE(it.blobs.empty());
     std::size_t explained = 0;
     for (const Blob::Sample& sample : it.blobs[0].samples)
-      explained += it.cover.explains(sample.u, sample.v, sample.colour);
+      explained += it.cover.explains(Eigen::Vector2d(sample.u, sample.v), sample.colour);
     EXPECT_GT(static_cast<double>(explained), 0.95 * static_cast<double>(it.blobs[0].samples.size()));
-    EXPECT_FALSE(lies_beside(it.scene.camera, it.scene.marker, it.pose, it.blobs[0], it.scene.bands));
+    EXPECT_FALSE(it.cover.lies_beside(it.blobs[0], it.scene.bands));
   }
 }
 
@@ -44,9 +42,9 @@ TEST(ShaftCover, LeavesWhatLiesBesideIt) {
     sample.u = static_cast<int>(middle_px.x()), sample.v = static_cast<int>(middle_px.y());
   const ShaftCover* cover = &it.cover;
   EXPECT_EQ(without({beside}, {&cover, 1}).size(), 1U);
-  EXPECT_TRUE(lies_beside(it.scene.camera, it.scene.marker, it.pose, beside, it.scene.bands));
+  EXPECT_TRUE(it.cover.lies_beside(beside, it.scene.bands));
   for (Blob::Sample& sample : beside.samples) sample.colour = 200;
-  EXPECT_FALSE(lies_beside(it.scene.camera, it.scene.marker, it.pose, beside, it.scene.bands)) << "others' colours";
+  EXPECT_FALSE(it.cover.lies_beside(beside, it.scene.bands)) << "others' colours";
 }
 
 TEST(ShaftCover, HidesWhatLiesBehindIt) {
@@ -54,10 +52,10 @@ TEST(ShaftCover, HidesWhatLiesBehindIt) {
   for (const double along : {-0.5, 0.2, 0.8}) {
     const Eigen::Vector3d point =
         it.pose.camera_from_unrolled * Eigen::Vector3d(0, 0, along * it.scene.marker.length_m());
-    const Eigen::Vector2d px = it.scene.camera.raw_from_point(point);
-    EXPECT_TRUE(it.cover.hides(px.x(), px.y(), 1.1 * point.z())) << along;
-    EXPECT_FALSE(it.cover.hides(px.x(), px.y(), 0.9 * point.z())) << along;
-    EXPECT_FALSE(it.cover.hides(px.x() + 400, px.y() + 400, 1.1 * point.z())) << along;
+    EXPECT_TRUE(it.cover.hides(1.1 * point)) << along;
+    EXPECT_FALSE(it.cover.hides(0.9 * point)) << along;
+    const double aside_m = 400 / it.scene.camera.fx_px * point.z();
+    EXPECT_FALSE(it.cover.hides(1.1 * (point + Eigen::Vector3d(aside_m, aside_m, 0)))) << along;
   }
 }
 
@@ -70,15 +68,15 @@ TEST(ShaftCover, LiesUnderTheShaftAloneWhateverTheLens) {
     Random random(4);
     const Marker& marker = rig.instruments[0].marker;
     const ShaftPose pose = scenes::pose_of(rig, 0, scenes::random_configuration(rig, 0, random));
-    ShaftCover cover;
-    cover.draw(rig.camera, marker, {1, 2, 3}, pose);
+    const ShaftCover cover(rig.camera, marker, {1, 2, 3}, pose);
     const Rigid3 shaft_from_camera = pose.camera_from_unrolled.inverse();
     int covered = 0, far = 0;
     for (int v = 2; v < rig.camera.height_px; v += 4)
       for (int u = 2; u < rig.camera.width_px; u += 4) {
-        if (!cover.hides(u, v, 10)) continue;
+        const Eigen::Vector2d px(u, v);
+        if (!cover.explains(px, 1) && !cover.explains(px, 2) && !cover.explains(px, 3)) continue;
         ++covered;
-        const Eigen::Vector3d ray = rig.camera.ray_from_ideal(rig.camera.ideal_from_raw(Eigen::Vector2d(u, v)).value());
+        const Eigen::Vector3d ray = rig.camera.ray_from_ideal(rig.camera.ideal_from_raw(px).value());
         const Eigen::Vector3d eye = shaft_from_camera.translation, way = shaft_from_camera.rotation * ray;
         const Eigen::Vector2d across = way.head<2>().normalized();
         const double apart_m = std::abs(across.x() * eye.y() - across.y() * eye.x());
@@ -94,14 +92,15 @@ TEST(ShaftCover, MayMeetOnlyWhatIsNear) {
   Random random(1);
   const scenes::CrossingPair pair = scenes::crossing_pair(rig, random);
   const ShaftPose first = scenes::pose_of(rig, 0, pair.q[0]);
-  ShaftPose other = scenes::pose_of(rig, 1, pair.q[1]);
+  const ShaftPose other = scenes::pose_of(rig, 1, pair.q[1]);
   const Marker& marker = rig.instruments[0].marker;
-  EXPECT_TRUE(may_meet(rig.camera, marker, first, marker, other));
+  const ShaftCover cover(rig.camera, marker, {1, 2, 3}, other);
+  EXPECT_TRUE(cover.may_meet(marker, first));
   ShaftPose beside = first;
   const Eigen::Vector3d axis = first.camera_from_unrolled.rotation * Eigen::Vector3d::UnitZ();
   beside.camera_from_unrolled.translation +=
       5 * marker.diameter_m * axis.cross(first.camera_from_unrolled.translation).normalized();
-  EXPECT_FALSE(may_meet(rig.camera, marker, first, marker, beside));
+  EXPECT_FALSE(ShaftCover(rig.camera, marker, {1, 2, 3}, beside).may_meet(marker, first));
 }
 
 }  // namespace lapservo::internal::shaft_cover_test
