@@ -19,7 +19,7 @@ namespace {
 
 constexpr double least_sine = 0.05;  // of the angle from the pole: lines fan out
 constexpr double few = 0.25;         // of samples or lines, which may show what most do not
-constexpr std::size_t line_count = 32, line_samples = 112, most_starts = 3;
+constexpr std::size_t line_count = 32, few_lines = 12, line_samples = 112, most_starts = 3;
 
 // Rays of the camera by their angles: alpha about a pole, beta from it. The pole is the direction to a point that the
 // shaft's axis passes through on its proximal side, so the axis lies on one alpha, with beta growing towards its tip.
@@ -68,7 +68,7 @@ bool may_be_in_order(BandCosines& bands) {
 
 // Over a blob's samples of the marker's colours, and as far beyond them as they are apart. Nullopt where they lie in
 // another order, or on all sides of the pole: the shaft points at the camera.
-std::optional<Fan> fan_over(const Scene& scene, const Blob& blob, const RaysFromPole& rays) {
+std::optional<Fan> fan_over(const Scene& scene, const Blob& blob, const RaysFromPole& rays, std::size_t lines) {
   std::optional<double> alpha_rad;  // of the first sample
   Eigen::Vector3d ahead = Eigen::Vector3d::Zero(), aside = ahead;
   double least_tangent = HUGE_VAL, most_tangent = -HUGE_VAL, least_cosine = 1, most_cosine = -1;
@@ -98,7 +98,7 @@ std::optional<Fan> fan_over(const Scene& scene, const Blob& blob, const RaysFrom
   const double last_alpha_rad = *alpha_rad + std::atan(most_tangent) + alpha_margin_rad;
   const double from_rad = std::max(0.0, first_beta - beta_margin_rad);
   const double to_rad = std::min(pi, last_beta + beta_margin_rad);
-  return Fan{rays, first_alpha_rad, (last_alpha_rad - first_alpha_rad) / static_cast<double>(line_count - 1), from_rad,
+  return Fan{rays, first_alpha_rad, (last_alpha_rad - first_alpha_rad) / static_cast<double>(lines - 1), from_rad,
              (to_rad - from_rad) / line_samples};
 }
 
@@ -288,18 +288,37 @@ void add_free_starts(const Scene& scene, const Extent& extent, double distance_m
   }
 }
 
-std::optional<Fan> split_fan(const Scene& scene, const Blob& blob, const Eigen::Vector3d& pole) {
-  auto fan = fan_over(scene, blob, RaysFromPole{pole});
+std::optional<Fan> split_fan(const Scene& scene, const Blob& blob, const Eigen::Vector3d& pole,
+                             std::size_t lines = line_count) {
+  auto fan = fan_over(scene, blob, RaysFromPole{pole}, lines);
   if (!fan) return std::nullopt;
   Samples samples;
   for (std::size_t k = 0; k < line_samples; ++k) {
     const double beta_rad = fan->beta_rad(static_cast<double>(k) + 0.5);
     samples[k] = {std::cos(beta_rad), std::sin(beta_rad)};
   }
-  for (std::size_t i = 0; i < line_count; ++i)
+  for (std::size_t i = 0; i < lines; ++i)
     fan->lines.push_back(line_at(scene, fan->rays, fan->alpha_rad(static_cast<double>(i)), samples));
   fan->windows = best_windows(scene, *fan);
   return fan;
+}
+
+// The pole of lines along the shaft by a fan of lines that are nearly: a marker's ends are square to its axis.
+Eigen::Vector3d turned_pole(const Fan& fan) {
+  constexpr std::size_t least_apart = 2;
+  const Window& window = fan.windows.front();
+  std::vector<double> slopes;
+  for (const std::size_t end : {0, 3})
+    for (std::size_t i = window.first; i <= window.last; ++i)
+      for (std::size_t j = i + least_apart; j <= window.last; ++j) {
+        const LineSegmentation &a = fan.lines[i], &b = fan.lines[j];
+        if (a.seen[end] && b.seen[end])
+          slopes.push_back((b.position[end] - a.position[end]) / static_cast<double>(j - i));
+      }
+  if (slopes.empty()) return fan.rays.pole;
+  const double turn_rad = std::atan(median(slopes) * fan.step_beta_rad / fan.step_alpha_rad);
+  const Eigen::Vector3d aside = fan.rays.across(fan.alpha_rad(static_cast<double>(window.middle)) + pi / 2);
+  return std::cos(turn_rad) * fan.rays.pole + std::sin(turn_rad) * aside;
 }
 
 // Where a blob spreads most, across the line of sight; nullopt where it shows nothing of the marker's colours.
@@ -338,8 +357,11 @@ void add_extents(const Scene& scene, const Blob& blob, const std::optional<Rigid
   }
   const auto direction = long_direction(scene, blob);
   if (!direction) return;
-  for (const Eigen::Vector3d& pole : {*direction, Eigen::Vector3d(-*direction)})
-    if (const auto fan = split_fan(scene, blob, pole)) add_extents(scene, *fan, extents);
+  for (const Eigen::Vector3d& pole : {*direction, Eigen::Vector3d(-*direction)}) {
+    auto fan = split_fan(scene, blob, pole, few_lines);
+    if (fan && !fan->windows.empty()) fan = split_fan(scene, blob, turned_pole(*fan));
+    if (fan) add_extents(scene, *fan, extents);
+  }
 }
 
 }  // namespace

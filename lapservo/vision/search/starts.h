@@ -23,11 +23,12 @@ struct Starts {
 
 /// Rough poses (rotation unknown, psi = 0) of a marker somewhere in a blob that may show other markers as well. Lines
 /// along the shaft are split into the marker's bands; those that agree side by side are the marker. The lines pass
-/// through the image of the RCM; without one (nullopt) they are parallel to the blob, and the poses are free. The ends
-/// give the depth with the RCM, else the tilt (two poses: tip towards or away from the camera); the width gives the
-/// depth where they do not. Where the image or another instrument hides one side, the axis lies a radius beside the
-/// other. In a scene with others, what they hide may be any part of the marker, so lines are split twice: with what is
-/// theirs left out and as they are. None of a blob that shows the bands in another order.
+/// through the image of the RCM; without one (nullopt) they are parallel to the blob and then square to the marker's
+/// ends, and the poses are free. The ends give the depth with the RCM, else the tilt (two poses: tip towards or away
+/// from the camera); the width gives the depth where they do not. Where the image or another instrument hides one
+/// side, the axis lies a radius beside the other. In a scene with others, what they hide may be any part of the marker,
+/// so lines are split twice: with what is theirs left out and as they are. None of a blob that shows the bands in
+/// another order.
 Starts starts_in(const Scene& scene, const Blob& blob, const std::optional<Rigid3>& camera_from_rcm);
 
 }  // namespace lapservo::internal
