@@ -21,8 +21,8 @@ struct QpSolution {
   Eigen::Vector4d x = Eigen::Vector4d::Zero();
   bool optimal = false;      ///< else feasible, but the iteration limit was reached
   bool constrained = false;  ///< at least one half-space holds x back
-  std::size_t strongest =
-      0;  ///< the place in `limits` of the one with the largest multiplier, where x is so and optimal
+  /// Place in `limits` of the half-space with the largest multiplier, where x is optimal and constrained.
+  std::size_t strongest = 0;
 };
 
 /// Minimises (x - wanted)^T weight (x - wanted) subject to `limits`, from a feasible start; `weight` is symmetric and

@@ -30,7 +30,7 @@ struct Offset {
   double time_s = 0;
   Eigen::Vector4d q = Eigen::Vector4d::Zero();  ///< of the instrument from the measured joints
   Measured measured;
-  SeenJoints seen;
+  SeenJoints seen;  ///< in that image; q alone where its boundaries do not show them
 };
 using Sightings = std::vector<MarkerSighting>;
 
@@ -51,12 +51,12 @@ struct WrongRig {
 }  // namespace endoscope
 
 /// Notices that the endoscope moved, and measures camera_from_rcm anew. Images which agreed with the joints then show
-/// the marker as well as before, but where the joints are not, or on a shaft that misses the RCM by more than before
-/// (seen_joints()): what hides a marker, freezes an image, sets an encoder or blocks a joint does not do that, nor does
-/// a registration that was a little wrong from the start. From then on the arm is the operator's. A rig that was wrong
-/// from the start (explain_disagreement()) is no moved endoscope: the arm is held for good. Images and measured joints
-/// of the motion that the operator makes give camera_from_rcm; the loop goes by it after JointState::started, unless
-/// the newest image contradicts it.
+/// the marker as well as before, but where the joints are not, or on a shaft that misses the RCM by more than the
+/// registration's uncertainty explains (largest_misfit_rad()): what hides a marker, freezes an image, sets an encoder
+/// or blocks a joint does not do that, nor does a registration that was a little wrong from the start. From then on the
+/// arm is the operator's. A rig that was wrong from the start (explain_disagreement()) is no moved endoscope: the arm
+/// is held for good. Images and measured joints of the motion that the operator makes give camera_from_rcm; the loop
+/// goes by it after JointState::started, unless the newest image contradicts it.
 class EndoscopeRecovery {
  public:
   explicit EndoscopeRecovery(const Rig& rig);
