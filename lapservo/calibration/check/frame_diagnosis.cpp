@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <iterator>
 #include <optional>
+#include <utility>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -43,18 +44,6 @@ bool is_grey(const cv::Mat& bgr) {
 
 bool is_ok(const Observation& seen) {
   return seen.status == Status::ok;
-}
-
-// Ends as soon as it is decided.
-template <typename Wanted>
-bool most(const std::vector<cv::Mat>& frames, Wanted wanted) {
-  std::size_t with = 0, without = 0;
-  for (const cv::Mat& frame : frames) {
-    ++(wanted(frame) ? with : without);
-    if (2 * with > frames.size()) return true;
-    if (2 * without >= frames.size()) return false;
-  }
-  return false;
 }
 
 // On the line that faces the camera.
@@ -108,11 +97,12 @@ double most_of_band_px(const Marker& marker, std::size_t band, double others_px)
   return one_hidden * beside * others_px + narrowest_px2;
 }
 
-// A few frames, 8-bit BGR, of which most are to show an instrument when they are read in another way.
+// A few frames, 8-bit BGR, of which most are to show an instrument when they are read in another way; and `shown`,
+// empty or a frame that shows one as the rig reads it: a cause that holds for all frames shows it there, too.
 class OtherReadings {
  public:
-  OtherReadings(const std::vector<cv::Mat>& frames, const Rig& rig, bool deinterlaced)
-      : frames_(frames), rig_(rig), deinterlaced_(deinterlaced) {}
+  OtherReadings(const std::vector<cv::Mat>& frames, const Rig& rig, bool deinterlaced, cv::Mat shown = {})
+      : frames_(frames), rig_(rig), deinterlaced_(deinterlaced), shown_(std::move(shown)) {}
 
   // The cause and its remedy where another order of channels, mirroring, other hues, another diameter, lens or focal
   // length shows it; else empty.
@@ -147,10 +137,22 @@ class OtherReadings {
   }
 
  private:
+  // Ends as soon as it is decided.
+  template <typename Wanted>
+  bool most(Wanted wanted) const {
+    std::size_t with = 0, without = 0;
+    for (const cv::Mat& frame : frames_) {
+      ++(wanted(frame) ? with : without);
+      if (2 * with > frames_.size()) return shown_.empty() || wanted(shown_);
+      if (2 * without >= frames_.size()) return false;
+    }
+    return false;
+  }
+
   template <typename Change, typename Wanted>
   bool most_show(Change change, Wanted wanted) const {
     Tracker tracker(rig_, {.single = true, .deinterlace = deinterlaced_});
-    return most(frames_, [&](const cv::Mat& frame) {
+    return most([&](const cv::Mat& frame) {
       cv::Mat changed;
       change(frame, changed);
       return std::ranges::any_of(tracker.track(changed), wanted);
@@ -166,7 +168,7 @@ class OtherReadings {
     for (const Instrument& instrument : rig.instruments)
       if (marker_problem(instrument.marker)) return false;
     Tracker tracker(rig, {.single = true, .deinterlace = deinterlaced_});
-    return most(frames_, [&](const cv::Mat& frame) { return std::ranges::any_of(tracker.track(frame), is_ok); });
+    return most([&](const cv::Mat& frame) { return std::ranges::any_of(tracker.track(frame), is_ok); });
   }
 
   std::string other_images() const {
@@ -229,6 +231,7 @@ class OtherReadings {
   const std::vector<cv::Mat>& frames_;
   const Rig& rig_;
   bool deinterlaced_;
+  cv::Mat shown_;
 };
 
 }  // namespace
@@ -327,7 +330,10 @@ void FrameDiagnosis::add(const cv::Mat& bgr, const std::vector<Observation>& obs
   interlaced_ += any(Status::interlaced) ? 1 : 0;
   blended_ += any(Status::blended) ? 1 : 0;
   without_instrument_ += any(Status::ok) ? 0 : 1;
-  if (!any_result) keep(bgr);
+  if (!any_result)
+    keep(bgr);
+  else if (shown_.empty())
+    shown_ = bgr.clone();
 }
 
 // Frames 1, 2, 4, 8 ... of those without a result: early ones, and some from all over a long recording.
@@ -340,7 +346,7 @@ void FrameDiagnosis::keep(const cv::Mat& bgr) {
 std::string FrameDiagnosis::text(bool lossy) const {
   if (frames_ == 0) return no_frame;
   const bool seldom_shown = 2 * without_instrument_ > frames_;
-  std::string shown = seldom_shown ? cause_in_frames(without_instrument_ == frames_) : text_of_missed_rcm();
+  std::string shown = seldom_shown ? cause_in_frames() : text_of_missed_rcm();
   if (shown.empty()) shown = text_of_moving_hues();
   return shown.empty() && seldom_shown ? text_of_refusals(lossy) : shown;
 }
@@ -384,12 +390,12 @@ std::string FrameDiagnosis::background(std::size_t instrument) const {
 
 std::string FrameDiagnosis::cause() const {
   if (frames_ == 0) return std::string("; ") + no_frame;
-  std::string shown = cause_in_frames(true);
+  std::string shown = cause_in_frames();
   if (shown.empty()) shown = text_of_refusals(false);
   return shown.empty() ? "" : "; " + shown;
 }
 
-std::string FrameDiagnosis::cause_in_frames(bool found_nowhere) const {
+std::string FrameDiagnosis::cause_in_frames() const {
   if (2 * damaged_ > frames_) return text_of_damaged(damaged_, frames_);
   if (kept_.empty()) return "";
   if (!deinterlaced_ && 2 * interlaced_ > frames_)
@@ -402,12 +408,11 @@ std::string FrameDiagnosis::cause_in_frames(bool found_nowhere) const {
   if (std::ranges::all_of(kept_, is_grey))
     return "the frames are grey, and the marker is found by its colours: see whether the camera or its driver sends "
            "mono";
-  const OtherReadings otherwise(kept_, rig_, deinterlaced_);
-  if (found_nowhere)
-    if (std::string found = otherwise.found(); !found.empty()) return found;
+  const OtherReadings otherwise(kept_, rig_, deinterlaced_, shown_);
+  if (std::string found = otherwise.found(); !found.empty()) return found;
   if (std::ranges::all_of(lights, &PictureLight::overexposed))
     return "the frames are overexposed, and their hues with them: lower the exposure, the gain or the light";
-  return found_nowhere ? otherwise.other_bands() : "";
+  return shown_.empty() ? otherwise.other_bands() : "";
 }
 
 std::string FrameDiagnosis::text_of_moving_hues() const {

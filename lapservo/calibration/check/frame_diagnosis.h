@@ -78,7 +78,7 @@ class FrameDiagnosis {
     Spread<std::optional<MarkerLight>> lights{48};  ///< where it is found
   };
   void keep(const cv::Mat& bgr);
-  std::string cause_in_frames(bool found_nowhere) const;
+  std::string cause_in_frames() const;
   std::string text_of_refusals(bool lossy) const;
   std::string text_of_missed_rcm() const;
   std::string text_of_moving_hues() const;
@@ -88,6 +88,7 @@ class FrameDiagnosis {
   int frames_ = 0, without_instrument_ = 0, interlaced_ = 0, blended_ = 0, damaged_ = 0;
   std::map<std::string, Seen> seen_;
   std::vector<cv::Mat> kept_;
+  cv::Mat shown_;  ///< the first frame with a result
   int without_result_ = 0;  ///< frames, some of which may show an instrument that misses the rig's RCM
 };
 
