@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 # folder: lines, chosen numbers
-LIMITS = {"lapservo/vision": (9397, 267)}
+LIMITS = {"lapservo/vision": (9395, 267)}
 TESTS = ["*_test.cpp", "*/test_*.cpp", "*/test_*.h", "lapservo/testing/*", "acceptance/*.cpp", "acceptance/*.h", "fuzz/*.cpp", "fuzz/*.h"]
 MOST_TEST_LINES = 36988
 

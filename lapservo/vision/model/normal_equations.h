@@ -11,20 +11,18 @@ class NormalEquations {
  public:
   /// residual = measured - predicted, row = d(predicted)/d(unknowns).
   void add(const UnknownVector& row, double residual, double weight) {
-    for (int i = 0; i < fit_unknowns; ++i) {
-      const double weighted = weight * row[i];
-      for (int j = 0; j <= i; ++j) upper_(j, i) += weighted * row[j];
-      gradient_[i] += weighted * residual;
-    }
+    const UnknownVector weighted = weight * row;
+    information_ += weighted.lazyProduct(row.transpose());
+    gradient_ += residual * weighted;
   }
 
-  UnknownMatrix information() const { return upper_.selfadjointView<Eigen::Upper>(); }
+  const UnknownMatrix& information() const { return information_; }
 
   /// The step; `damping` scales the diagonal (Marquardt). Directions without information get no step.
   UnknownVector solve(double damping) const;
 
  private:
-  UnknownMatrix upper_ = UnknownMatrix::Zero();
+  UnknownMatrix information_ = UnknownMatrix::Zero();
   UnknownVector gradient_ = UnknownVector::Zero();
 };
 
