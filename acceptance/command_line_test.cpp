@@ -398,7 +398,7 @@ TEST_F(CommandLine, ServoRefusesWhatCanNotBe) {
   expect_refused(servo + " --robot sim --operator-present page", {"--operator-present", "--web"});
   expect_refused(servo + " --robot sim --operator-present /pedal", {"--operator-present", "/pedal", "page"});
   expect_refused(servo + " --robot ros2:PSM1 --enable-motion", {"--enable-motion", "--joint-limits"});
-  expect_refused("servo --replay in/log.csv", {"rig.yaml"});
+  expect_refused("servo --replay in/log.csv", {"in/log.csv: can't be opened"});
   const std::string bag = " --replay " + in("run.bag", "#ROSBAG V2.0\n");
   for (const std::string of_arm : {"--camera /dev/video0", "--control topics", "--enable-motion",
                                    "--endoscope ros2:ECM", "--setpoint-readers 2", "--tf-frames a,b,c,d"})

@@ -101,6 +101,7 @@ TEST_F(Outputs, NeverGoOverInputs) {
   fs::create_symlink("frames/0001.png", "soft.png");
   fs::create_directory("mixed");
   fs::create_symlink("../frames/0001.png", "mixed/0000.png");
+  write_file("joints.csv", "time_s,outer_yaw,outer_pitch,outer_insertion,outer_roll\n0,0,0,0.1,0\n1,0,0,0.1,0\n");
   const auto snapshot = [] {
     std::string all;
     for (const auto& entry : fs::recursive_directory_iterator("."))
@@ -129,6 +130,9 @@ TEST_F(Outputs, NeverGoOverInputs) {
   for (const char* arguments : {"track frames/0001.png --out frames/rig.yaml", "track frames --out new.mp4",
                                 "check frames --rig rig.yaml --out new.csv"})
     expect_refused(arguments, {"one that ends in"});
+  for (const char* arguments : {"align frames --rig configs/paper.yaml --joints joints.csv --report no/page.html",
+                                "calibrate all --rig rig.yaml --report no/page.html"})
+    expect_refused(arguments, {"no/page.html: can't be written"});  // before any work
   for (const char* step : {"marker frames", "camera frames --board 9x6 --square-mm 5"})
     expect_refused(std::string("calibrate ") + step + " --rig rig.yaml --out cam.yaml", {"a whole rig would replace"});
   expect_refused("marker design --diameter-mm 8.4 --distance-mm 100 --out rig.yaml", {"is a rig", "marker"});

@@ -125,6 +125,7 @@ int replay_log(const ServoOptions& options, const Command& command) {
     if (name != "--replay")
       throw InputError(name, "is given, expected none with a log: rig.yaml and controller.yaml beside it count");
   const std::filesystem::path log = options.recorded.input, folder = log.parent_path();
+  const auto ticks = read_servo_log(log);  // first: another file has no rig.yaml beside it
   const std::string rig_file = (folder / "rig.yaml").string();
   Rig rig = first_instrument(load_rig(rig_file), rig_file);
   const ControllerConfig controller = load_controller(folder / "controller.yaml", {});
@@ -133,7 +134,6 @@ int replay_log(const ServoOptions& options, const Command& command) {
   } else {
     rig = single_instrument(std::move(rig), rig_file);
   }
-  const auto ticks = read_servo_log(log);
   const auto difference = replay(ticks, rig, controller);
   if (!difference) {
     std::printf("%zu ticks reproduced bit for bit\n", ticks.size());
