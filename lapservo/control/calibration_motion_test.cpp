@@ -1,5 +1,7 @@
 #include "lapservo/control/calibration_motion.h"
 
+#include <cmath>
+
 #include <gtest/gtest.h>
 
 #include "lapservo/core/error.h"
@@ -54,6 +56,23 @@ TEST(CalibrationMotion, SwingsAsFarAsItsReachAndReturns) {
     for (double t = 0; t < 20; t += step_s) most = most.max((motion.at(t) - start).cwiseAbs().array());
     EXPECT_TRUE((most < reach + 1e-8).all() && (most > 0.8 * reach - 1e-8).all()) << most.transpose();
     EXPECT_LT((motion.at(20) - start).norm(), 1e-12);
+  }
+}
+
+TEST(CalibrationMotion, SwingsNoTwoJointsAlike) {
+  const Eigen::Vector4d start(0, 1.5, 0.1, 0);
+  for (const double duration_s : {8, 12, 20, 45}) {
+    for (const double slower : {1.0, 0.5, 0.25}) {
+      JointLimits limits;
+      limits.rate *= slower, limits.acceleration *= slower;
+      const JointMotion motion = swing_motion(start, limits, 1, duration_s);
+      Eigen::Matrix4d products = Eigen::Matrix4d::Zero();
+      for (double t = 0; t < duration_s; t += step_s)
+        products += (motion.at(t) - start) * (motion.at(t) - start).transpose();
+      const Eigen::Array4d size = products.diagonal().array().sqrt();
+      for (int i = 0; i < 4; ++i)
+        for (int k = 0; k < i; ++k) EXPECT_LT(std::abs(products(i, k)), 0.6 * size[i] * size[k]) << duration_s;
+    }
   }
 }
 
