@@ -99,6 +99,9 @@ int simulate(const ServoOptions& options) {
   simulated.seed = options.seed;
   simulated.endoscope.latency_s = options.latency_ms / 1000;
   simulated.endoscope.frame_rate_hz = options.periods_per_s();
+  // The zeros of joints are the rig's: the simulated arm reaches all that the loop's limits allow.
+  simulated.arm.lower = simulated.arm.lower.cwiseMin(config.controller.limits.lower);
+  simulated.arm.upper = simulated.arm.upper.cwiseMax(config.controller.limits.upper);
   const JointVector start = joints_at_start(options, trajectory, config, true_model, simulated.arm.joint_offset);
   Simulator simulator(true_rig, simulated, start);
   if (!options.hide.empty()) simulator.cover_marker({options.hide[0], options.hide[1]});
