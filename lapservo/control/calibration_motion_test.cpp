@@ -1,7 +1,5 @@
 #include "lapservo/control/calibration_motion.h"
 
-#include <cmath>
-
 #include <gtest/gtest.h>
 
 #include "lapservo/core/error.h"
@@ -59,20 +57,15 @@ TEST(CalibrationMotion, SwingsAsFarAsItsReachAndReturns) {
   }
 }
 
-TEST(CalibrationMotion, SwingsNoTwoJointsAlike) {
+TEST(CalibrationMotion, SwingsNoTwoJointsAlikeHoweverSlow) {
   const Eigen::Vector4d start(0, 1.5, 0.1, 0);
-  for (const double duration_s : {8, 12, 20, 45}) {
-    for (const double slower : {1.0, 0.5, 0.25}) {
-      JointLimits limits;
-      limits.rate *= slower, limits.acceleration *= slower;
-      const JointMotion motion = swing_motion(start, limits, 1, duration_s);
-      Eigen::Matrix4d products = Eigen::Matrix4d::Zero();
-      for (double t = 0; t < duration_s; t += step_s)
-        products += (motion.at(t) - start) * (motion.at(t) - start).transpose();
-      const Eigen::Array4d size = products.diagonal().array().sqrt();
-      for (int i = 0; i < 4; ++i)
-        for (int k = 0; k < i; ++k) EXPECT_LT(std::abs(products(i, k)), 0.6 * size[i] * size[k]) << duration_s;
-    }
+  for (const double duration_s : {3, 8, 12, 20, 60}) {
+    const JointMotion motion = swing_motion(start, {}, 1, duration_s);
+    Eigen::Matrix4d sum = Eigen::Matrix4d::Zero();
+    for (double t = 0; t < duration_s; t += step_s) sum += (motion.at(t) - start) * (motion.at(t) - start).transpose();
+    const Eigen::Vector4d size = sum.diagonal().cwiseSqrt();
+    sum.diagonal().setZero();
+    EXPECT_LT((sum.array() / (size * size.transpose()).array()).abs().maxCoeff(), 0.6) << duration_s;
   }
 }
 

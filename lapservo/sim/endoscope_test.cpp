@@ -49,17 +49,14 @@ TEST(Endoscope, DropsTheShareThatWasAskedFor) {
 }
 
 TEST(Endoscope, InRealTimeLeavesFramesOutAndDoesNotFallBehind) {
-  EndoscopeConfig config;
-  config.real_time = true;
   Camera camera;
   camera.width_px = 640, camera.height_px = 480, camera.fx_px = camera.fy_px = 600;
-  Endoscope endoscope(camera, {}, make_tissue(640, 480, 1), {}, config, 1);
-  constexpr long at_once = 300;
-  for (long k = 0; k < at_once; ++k) endoscope.expose({});
-  std::size_t count = 0;
-  for (long newest = 0; newest < at_once; endoscope.expose({}))
+  Endoscope endoscope(camera, {}, make_tissue(640, 480, 1), {}, {.real_time = true}, 1);
+  long count = 0, newest = 0;
+  for (int k = 0; k < 300; ++k) endoscope.expose({});
+  for (; newest < 300; endoscope.expose({}))
     for (const EndoscopePicture& picture : endoscope.arrived(INFINITY)) newest = picture.index, ++count;
-  EXPECT_LT(count, 100U);
+  EXPECT_LT(count, 100);
 }
 
 TEST(Endoscope, AnExposureHasItsMomentsEvenlyAroundItsMiddle) {
