@@ -271,6 +271,10 @@ TEST_F(CommandLine, ServoRunsAndReplays) {
   const std::string log = read_file("out/off/log.csv");
   write_file("out/off/log.csv", log.substr(0, log.find('\n') + 1));
   ToolTest::expect_refused("servo --replay out/off/log.csv", {"log.csv", "holds no tick"});
+  const std::string text = read_file("configs/paper.yaml"), turned = "-0.0156, -3]";
+  const std::string rig = in("turned.yaml", std::string(text).replace(text.find("-0.0156, 0]"), 11, turned));
+  expect_done("servo --robot sim --joint-limits configs/joint_limits/psm-classic.yaml --duration 8 --seed 3 --rig " +
+              rig);
   // It converges, and then ends in a hold.
   expect_failed("servo --rig configs/paper.yaml --robot sim --duration 5.5 --seed 2 --hide 5,9",
                 {"within 1 px and 5 mrad from", "ended in a hold: marker_lost"});
@@ -398,7 +402,7 @@ TEST_F(CommandLine, ServoRefusesWhatCanNotBe) {
   expect_refused(servo + " --robot sim --operator-present page", {"--operator-present", "--web"});
   expect_refused(servo + " --robot sim --operator-present /pedal", {"--operator-present", "/pedal", "page"});
   expect_refused(servo + " --robot ros2:PSM1 --enable-motion", {"--enable-motion", "--joint-limits"});
-  expect_refused("servo --replay in/log.csv", {"rig.yaml"});
+  expect_refused("servo --replay in/log.csv", {"in/log.csv: can't be opened"});
   const std::string bag = " --replay " + in("run.bag", "#ROSBAG V2.0\n");
   for (const std::string of_arm : {"--camera /dev/video0", "--control topics", "--enable-motion",
                                    "--endoscope ros2:ECM", "--setpoint-readers 2", "--tf-frames a,b,c,d"})

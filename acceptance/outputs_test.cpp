@@ -311,6 +311,9 @@ TEST_F(Outputs, AFolderThatCanNotBeWrittenIsSaidBeforeTheWork) {
     for (const char* end : {"read_only", "read_only/a"}) expect_refused(command + end, {"read_only"});
   for (const char* command : {"track frames --out ", "marker design --out ", "track frames/0000.png --overlay "})
     expect_refused(std::string(command) + "read_only/a.png", {"read_only/a.png"});
+  for (const char* command : {"calibrate all --report ", "check frames --out "})
+    expect_refused(command + ("read_only/a.html --rig " + rig_), {"a.html: can't be written"});
+  EXPECT_EQ(output(), "");
   if (root) ::umount("read_only");
 }
 

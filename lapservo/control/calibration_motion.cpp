@@ -47,7 +47,9 @@ JointMotion swing_motion(const Eigen::Vector4d& start, const JointLimits& limits
   const Eigen::Array4d amplitude = swing_reach(start, limits, scale, duration_s).array().max(1e-9);
   // Shares of the acceleration limit: 0.3 for the swings, 0.15 for easing, and at most 0.33 for both together.
   const Eigen::Array4d fastest = (share_of_swinging * rate / amplitude).min((0.3 * acceleration / amplitude).sqrt());
-  const Eigen::Array4d omega = fastest.min(two_pi / duration_s * Eigen::Array4d(3, 4, 5, 2));
+  // All are slower by one factor: images do not distinguish joints of one frequency.
+  const Eigen::Array4d wanted = two_pi / duration_s * Eigen::Array4d(3, 4, 5, 2);
+  const Eigen::Array4d omega = wanted * std::min(1.0, (fastest / wanted).minCoeff());
   return {duration_s, [=](double time_s) -> Eigen::Vector4d {
             const double t = std::clamp(time_s, 0.0, duration_s);
             const double share = eased(t / ease_s) * eased((duration_s - t) / ease_s);

@@ -57,6 +57,18 @@ TEST(CalibrationMotion, SwingsAsFarAsItsReachAndReturns) {
   }
 }
 
+TEST(CalibrationMotion, SwingsNoTwoJointsAlikeHoweverSlow) {
+  const Eigen::Vector4d start(0, 1.5, 0.1, 0);
+  for (const double duration_s : {3, 8, 12, 20, 60}) {
+    const JointMotion motion = swing_motion(start, {}, 1, duration_s);
+    Eigen::Matrix4d sum = Eigen::Matrix4d::Zero();
+    for (double t = 0; t < duration_s; t += step_s) sum += (motion.at(t) - start) * (motion.at(t) - start).transpose();
+    const Eigen::Vector4d size = sum.diagonal().cwiseSqrt();
+    sum.diagonal().setZero();
+    EXPECT_LT((sum.array() / (size * size.transpose()).array()).abs().maxCoeff(), 0.6) << duration_s;
+  }
+}
+
 TEST(CalibrationMotion, TurnsOnceAndALittleMoreAndReturns) {
   const JointLimits limits;
   const JointMotion motion = turn_motion({0, 1.5, 0.1, 3.5}, limits, "limits");

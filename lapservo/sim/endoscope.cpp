@@ -78,7 +78,7 @@ void Endoscope::expose(const Exposure& shafts) {
   picture.exposed_s = static_cast<double>(next_) / config_.frame_rate_hz + config_.exposure_s / 2;
   const double closes_s = picture.exposed_s + config_.exposure_s / 2;
   ++next_;
-  if (dropped) return;
+  if (dropped || falls_behind()) return;
   // Frames don't overtake one another, nor arrive before they are taken.
   picture.stamp_s = std::max({picture.exposed_s + config_.latency_s + jitter_s, closes_s, last_stamp_s_});
   last_stamp_s_ = picture.stamp_s;
@@ -90,6 +90,12 @@ void Endoscope::expose(const Exposure& shafts) {
           return renderers[thread].render_exposure(shafts, noise_seed);
         });
   on_the_way_.push_back({std::move(picture), std::move(rendered)});
+}
+
+// In real time no frame waits for those before it: else each comes later than the last one.
+bool Endoscope::falls_behind() const {
+  const auto busy = std::ranges::count_if(on_the_way_, is_being_rendered, &OnTheWay::rendered);
+  return config_.real_time && busy > 0 && busy >= config_.render_threads;
 }
 
 std::vector<EndoscopePicture> Endoscope::arrived(double time_s) {

@@ -21,8 +21,8 @@ struct EndoscopeConfig {
   double jitter_s = 0.001;          ///< arrival is evenly up to this much earlier or later
   double dropped_fraction = 0.005;  ///< of the frames that never arrive
   int render_threads = 2;           ///< frames are rendered while they are on their way; 0: on request
-  bool real_time = false;           ///< an image that is not rendered in time arrives late, and nobody waits for it
-  bool pictures = true;             ///< false: frames arrive without an image, for studies that need only their times
+  bool real_time = false;  ///< nobody waits for an image: where it is not rendered in time, it is late or left out
+  bool pictures = true;    ///< false: frames arrive without an image, for studies that need only their times
 
   /// Returns itself if all its numbers make sense; else throws InputError naming the first field that doesn't.
   const EndoscopeConfig& checked() const;
@@ -63,6 +63,8 @@ class Endoscope {
     EndoscopePicture picture;
     std::future<cv::Mat> rendered;
   };
+
+  bool falls_behind() const;
 
   EndoscopeConfig config_;
   Light gains_;

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/core/error.h"
+#include "lapservo/sim/tissue.h"
 
 namespace lapservo::internal::endoscope_test {
 
@@ -45,6 +46,17 @@ TEST(Endoscope, DropsTheShareThatWasAskedFor) {
   config.dropped_fraction = 0.2;
   const auto pictures = taken(config, 7, 5000);
   EXPECT_NEAR(static_cast<double>(pictures.size()) / 5000, 0.8, 4 * std::sqrt(0.2 * 0.8 / 5000));
+}
+
+TEST(Endoscope, InRealTimeLeavesFramesOutAndDoesNotFallBehind) {
+  Camera camera;
+  camera.width_px = 640, camera.height_px = 480, camera.fx_px = camera.fy_px = 600;
+  Endoscope endoscope(camera, {}, make_tissue(640, 480, 1), {}, {.real_time = true}, 1);
+  long count = 0, newest = 0;
+  for (int k = 0; k < 300; ++k) endoscope.expose({});
+  for (; newest < 300; endoscope.expose({}))
+    for (const EndoscopePicture& picture : endoscope.arrived(INFINITY)) newest = picture.index, ++count;
+  EXPECT_LT(count, 100);
 }
 
 TEST(Endoscope, AnExposureHasItsMomentsEvenlyAroundItsMiddle) {

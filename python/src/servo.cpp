@@ -47,12 +47,23 @@ py::sequence sequence_of(const py::object& given, std::size_t size, const char* 
   return py::reinterpret_borrow<py::sequence>(given);
 }
 
+// The result of a Python method. For one of another type, pybind's own message does not name the method.
+template <typename Ask>
+auto given_by(const char* method, const char* expected, const Ask& ask) {
+  try {
+    return ask();
+  } catch (const py::builtin_exception&) {
+    throw InputError(method, std::string("gives another type, expected ") + expected);
+  }
+}
+
 // The ports, implemented in Python.
 class PythonRobot : public Robot {
  public:
   JointState state() override {
     const Asking loop;
-    PYBIND11_OVERRIDE_PURE(JointState, Robot, state);
+    return given_by("Robot.state()", "lapservo.JointState",
+                    [&]() -> JointState { PYBIND11_OVERRIDE_PURE(JointState, Robot, state); });
   }
   std::vector<JointReading> readings() override {
     const py::gil_scoped_acquire mine;
@@ -62,8 +73,9 @@ class PythonRobot : public Robot {
     using Time = Number<"Robot.readings()", Numbers::any>;
     using Reading = Array<"Robot.readings()", 4, 1, Numbers::any>;
     std::vector<JointReading> readings;
-    for (const auto& [time_s, q] : method().cast<std::vector<std::pair<Time, Reading>>>())
-      readings.push_back({time_s.value, JointVector::from_vector(q.value)});
+    const auto given = given_by("Robot.readings()", "[(time_s, q), ...]",
+                                [&] { return method().cast<std::vector<std::pair<Time, Reading>>>(); });
+    for (const auto& [time_s, q] : given) readings.push_back({time_s.value, JointVector::from_vector(q.value)});
     return readings;
   }
   void send(const JointPath& path) override { PYBIND11_OVERRIDE_PURE(void, Robot, send, path); }
@@ -79,7 +91,9 @@ class PythonRobot : public Robot {
 
 class PythonClock : public Clock {
  public:
-  double now_s() const override { PYBIND11_OVERRIDE_PURE(double, Clock, now_s); }
+  double now_s() const override {
+    return given_by("Clock.now_s()", "seconds", [&]() -> double { PYBIND11_OVERRIDE_PURE(double, Clock, now_s); });
+  }
   double suspended_s() const override { PYBIND11_OVERRIDE(double, Clock, suspended_s); }
   void sleep_until(double time_s) override { PYBIND11_OVERRIDE_PURE(void, Clock, sleep_until, time_s); }
 };

@@ -197,3 +197,8 @@ def test_what_a_trajectory_or_arm_in_python_gives_is_refused_by_name(rig):
     limits = [[-1, 0.6, 0.03, -4], [1, 2.5, 0.2, 4], [0.4, 0.4, 0.04, 1.5], [2, 2, 0.2, 7.5]]
     controller = lapservo.Controller(rig, joint_limits=limits)
     assert refused(lapservo.run, Arm(), simulator, simulator, rig, goal, 1, controller=controller).source == "Robot.readings()"
+    Arm.readings = lambda self: None
+    assert refused(lapservo.run, Arm(), simulator, simulator, rig, goal, 1, controller=controller).source == "Robot.readings()"
+    del Arm.readings
+    Arm.state = lambda self: None
+    assert refused(lapservo.run, Arm(), simulator, simulator, rig, goal, 1, controller=controller).source == "Robot.state()"

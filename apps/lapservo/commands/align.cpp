@@ -46,13 +46,12 @@ Plot joint_plot(const Alignment& found, const Joints& joints, std::size_t joint)
                     curve("as the marker shows it", &Alignment::Pair::seen, Draw::points, 1)});
 }
 
-void write_page(const std::string& path, const std::string& input, const Alignment& found, const Joints& joints) {
+Report page_of(const std::string& input, const Alignment& found, const Joints& joints) {
   ReportSection section{"align", input};
   section.text = {offset_text(found), drift_text(found)};
   for (std::size_t joint = 0; joint < 4; ++joint)
     section.figures.push_back({joint_plot(found, joints, joint), "Over the frames' stamps."});
-  write_report(path, {"lapservo align", {}, {section}});
-  std::printf("report: %s\n", path.c_str());
+  return {"lapservo align", {}, {section}};
 }
 
 int run(const CalibrateOptions& options) {
@@ -68,7 +67,7 @@ int run(const CalibrateOptions& options) {
   const Alignment found = align(instrument, poses.all, joints->recording, joints->source);
   if (!found.refusal.empty()) return refuse(options.input, found.refusal);
   std::printf("%s\n%s\n", offset_text(found).c_str(), drift_text(found).c_str());
-  if (!options.report.empty()) write_page(options.report, options.input, found, instrument.joints.value());
+  job.write_page(page_of(options.input, found, instrument.joints.value()));
   if (!job.out) {
     std::printf("to apply it: write it into %s's entry in %s, or repeat this with --out %s\n", instrument.name.c_str(),
                 options.rig.c_str(), options.rig.c_str());

@@ -308,7 +308,7 @@ std::string region_of(const CheckedRig& checked) {
   return "checked by images alone: not the joints, nor where they put the marker";
 }
 
-void write_page(const std::string& path, const std::string& instrument, const CheckedRig& checked) {
+Report page_of(const std::string& instrument, const CheckedRig& checked) {
   ReportSection section{"check", instrument + ": " + verdict_of(checked),
                         checked.good_enough() ? Verdict::good : Verdict::bad};
   section.text.push_back(region_of(checked));
@@ -323,7 +323,7 @@ void write_page(const std::string& path, const std::string& instrument, const Ch
       "Each of focal length, drift, delay and registration is what is left of it with the others taken out.",
       "Sigmas over the work space are those of rendered frames, times what the recording's own have over "
       "renderings of the same poses."};
-  write_report(path, {"lapservo check", {}, {section}});
+  return {"lapservo check", {}, {section}};
 }
 
 void print(const CheckedRig& checked) {
@@ -427,11 +427,10 @@ int check(const CalibrateOptions& options) {
   checked.exact_registration = exact_registration_text(instrument);
   std::printf("%s\n", instrument.name.c_str());
   print(checked);
-  if (!options.report.empty()) {
+  if (job.page) {
     if (!seen.empty()) checked.found_segmented = segmentation_picture(seen, rig);
     if (!missed.empty()) checked.missed_segmented = segmentation_picture(missed, rig);
-    write_page(options.report, instrument.name, checked);
-    std::printf("report: %s\n", options.report.c_str());
+    job.write_page(page_of(instrument.name, checked));
   }
   return checked.good_enough() ? 0 : 1;
 }

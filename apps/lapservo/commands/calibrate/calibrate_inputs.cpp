@@ -110,11 +110,19 @@ InstrumentJob::InstrumentJob(const CalibrateOptions& given, bool with_frames)
 
 void InstrumentJob::begin() {
   if (!options.out.empty()) out.emplace(options.out);
+  if (!options.report.empty()) page.emplace(options.report);
   watch_for_interrupts();
 }
 
 int InstrumentJob::refuse(const std::string& why) const {
   return app::refuse(options.input, why + "; the rig is as it was");
+}
+
+void InstrumentJob::write_page(const Report& report) {
+  if (!page) return;
+  page->stream() << html_from(report);
+  page->commit();
+  std::printf("report: %s\n", options.report.c_str());
 }
 
 int InstrumentJob::write() {

@@ -11,6 +11,7 @@
 #include "lapservo/calibration/camera/camera_measurement.h"
 #include "lapservo/calibration/recording/frame_recording.h"
 #include "lapservo/core/atomic_file.h"
+#include "lapservo/report/html_report.h"
 #include "lapservo/rig/rig.h"
 
 namespace lapservo::app {
@@ -75,10 +76,12 @@ struct InstrumentJob {
   /// Throws InputError where it is open which instrument is meant, and when a result would go over an input or another
   /// result, a page over the rig, or the rig over its camera's or tools' files. `with_frames`: opens the input.
   explicit InstrumentJob(const CalibrateOptions& options, bool with_frames = true);
-  /// From now on Ctrl-C lets it end well. Throws InputError where --out can't be written.
+  /// From now on Ctrl-C lets it end well. Throws InputError where the rig or the page can't be written.
   void begin();
   /// refuse(), where the rig stays as it was.
   int refuse(const std::string& why) const;
+  /// Writes the page, if one is wanted, and says where it is.
+  void write_page(const internal::Report& report);
   /// Writes the rig with what was measured, and says where it is; returns the exit code. Throws InputError as
   /// RigAsRead::expect_unchanged().
   int write();
@@ -91,7 +94,7 @@ struct InstrumentJob {
   Rig rig;
   std::size_t index;
   std::unique_ptr<FrameSource> frames;
-  std::optional<internal::AtomicFile> out;
+  std::optional<internal::AtomicFile> out, page;
 };
 
 /// Options of `calibrate camera`.

@@ -99,6 +99,9 @@ int simulate(const ServoOptions& options) {
   simulated.seed = options.seed;
   simulated.endoscope.latency_s = options.latency_ms / 1000;
   simulated.endoscope.frame_rate_hz = options.periods_per_s();
+  // The zeros of joints are the rig's: the simulated arm reaches all that the loop's limits allow.
+  simulated.arm.lower = simulated.arm.lower.cwiseMin(config.controller.limits.lower);
+  simulated.arm.upper = simulated.arm.upper.cwiseMax(config.controller.limits.upper);
   const JointVector start = joints_at_start(options, trajectory, config, true_model, simulated.arm.joint_offset);
   Simulator simulator(true_rig, simulated, start);
   if (!options.hide.empty()) simulator.cover_marker({options.hide[0], options.hide[1]});
@@ -125,6 +128,7 @@ int replay_log(const ServoOptions& options, const Command& command) {
     if (name != "--replay")
       throw InputError(name, "is given, expected none with a log: rig.yaml and controller.yaml beside it count");
   const std::filesystem::path log = options.recorded.input, folder = log.parent_path();
+  const auto ticks = read_servo_log(log);  // first: another file has no rig.yaml beside it
   const std::string rig_file = (folder / "rig.yaml").string();
   Rig rig = first_instrument(load_rig(rig_file), rig_file);
   const ControllerConfig controller = load_controller(folder / "controller.yaml", {});
@@ -133,7 +137,6 @@ int replay_log(const ServoOptions& options, const Command& command) {
   } else {
     rig = single_instrument(std::move(rig), rig_file);
   }
-  const auto ticks = read_servo_log(log);
   const auto difference = replay(ticks, rig, controller);
   if (!difference) {
     std::printf("%zu ticks reproduced bit for bit\n", ticks.size());
