@@ -297,9 +297,8 @@ void VisualController::limit(const Law& law, const Eigen::Vector4d& q_joint, Con
     wanted = cross_gaps(confirmed, motion, now.gap, arm_response_.drive(), q_joint, law.feed_forward, slowed,
                         config_.period_s);
   }
-  wanted = following_error_limit_.apply(motion.velocity, wanted, config_.period_s);
-  const auto limited =
-      limit_velocity(config_.limits, config_.window, motion, ends, wanted, law.weight, config_.period_s, law.rate);
+  const auto limited = limit_velocity(config_.limits, config_.window, motion, ends, wanted, law.weight,
+                                      config_.period_s, following_error_limit_.range(law.rate));
   if (!limited.velocity.allFinite()) {
     step.reason = HoldReason::non_finite;
     return;
@@ -311,10 +310,9 @@ void VisualController::limit(const Law& law, const Eigen::Vector4d& q_joint, Con
 
 /// Brakes, except where setpoints have to come back to a joint that did not follow.
 Eigen::Vector4d VisualController::limited_hold(const Eigen::Vector4d& braking) const {
-  const MotionState motion = path_.at(now_s_);
-  const Eigen::Vector4d wanted = following_error_limit_.apply(motion.velocity, braking, config_.period_s);
-  if (wanted == braking) return braking;
-  return limit_velocity(config_.limits, {}, motion, {}, wanted, joint_weight_, config_.period_s).velocity;
+  return limit_velocity(config_.limits, {}, path_.at(now_s_), {}, braking, joint_weight_, config_.period_s,
+                        following_error_limit_.range(config_.limits.rate))
+      .velocity;
 }
 
 }  // namespace lapservo::internal

@@ -275,12 +275,18 @@ TEST(VisualController, SaysWhichLimitKeepsItFromItsGoal) {
     (upper ? config.limits.upper : config.limits.lower)[joint] = (start[joint] + there[joint]) / 2;
     VisualController controller(config, testing::model_of({}));
     TestSimulator simulator({}, flaws, start, seed);
-    const Moment held = simulator.run(controller, goal(there), 15).back();
+    const Moments moments = simulator.run(controller, goal(there), 15);
+    const Moment& held = moments.back();
     EXPECT_TRUE(held.step.velocity.isZero());
     if (held.step.reason == HoldReason::error_grows) continue;
     ASSERT_EQ(held.step.reason, HoldReason::goal_beyond_limit);
     ++said;
     EXPECT_EQ(std::pair(held.step.stops_at->of, held.step.stops_at->upper), std::pair(joint, upper));
+    for (std::size_t k = 1; k + 60 < moments.size(); ++k) {
+      const Eigen::Vector4d change = (moments[k].step.velocity - moments[k - 1].step.velocity) / config.period_s;
+      if (moments[k].step.reason == HoldReason::none && moments[k + 60].step.reason == held.step.reason)
+        ASSERT_LE(change.cwiseQuotient(config.limits.acceleration).cwiseAbs().maxCoeff(), 0.2) << "it trembles";
+    }
     EXPECT_EQ(simulator.run(controller, goal(start), 0.1).front().step.reason, HoldReason::none);
   }
   EXPECT_GE(said, 23);
