@@ -45,7 +45,7 @@ struct ControlStep {
   double delay_s = 0;                               ///< delay of the image by which the step goes
   bool delay_is_known = false;                      ///< given or estimated: else a first guess
   std::optional<Unanswered> unanswered{};           ///< with HoldReason::image_not_following
-  std::optional<PositionLimit> stops_at{};          ///< with HoldReason::goal_beyond_limit
+  std::optional<PositionLimit> stops_at{};          ///< with goal_beyond_limit, and error_grows along a limit
 };
 
 }  // namespace lapservo

@@ -40,19 +40,19 @@ bool FollowingErrorLimit::is_reached() const {
   return reached_s_ > some_s;
 }
 
-Eigen::Vector4d FollowingErrorLimit::apply(const Eigen::Vector4d& setpoint_velocity, const Eigen::Vector4d& wanted,
-                                           double period_s) const {
-  Eigen::Vector4d velocity = wanted;
-  for (int i = 0; i < 4; ++i) {
-    if (drive_.follows[static_cast<std::size_t>(i)]) continue;
-    const double side = ahead_[i] > 0 ? 1 : -1, left = allowed_[i] - side * ahead_[i];
+VelocityRange FollowingErrorLimit::range(const Eigen::Vector4d& rate) const {
+  VelocityRange range{-rate, rate};
+  // The largest speed to one side, at which the lead may grow by so much.
+  const auto fastest = [&](Eigen::Index i, double velocity, double left) {
     const double closing = std::copysign(closing_speed(std::abs(left), limits_.acceleration[i]), left);
-    const double fastest = std::max(0.0, side * drive_.velocity[i]) + closing;
-    if (side * wanted[i] <= fastest) continue;
-    const double slowest = side * setpoint_velocity[i] - limits_.acceleration[i] * period_s;
-    velocity[i] = side * std::max({fastest, slowest, -limits_.rate[i]});
+    return std::clamp(std::max(0.0, velocity) + closing, -rate[i], rate[i]);
+  };
+  for (Eigen::Index i = 0; i < 4; ++i) {
+    if (drive_.follows[static_cast<std::size_t>(i)]) continue;
+    range.upper[i] = fastest(i, drive_.velocity[i], allowed_[i] - ahead_[i]);
+    range.lower[i] = -fastest(i, -drive_.velocity[i], allowed_[i] + ahead_[i]);
   }
-  return velocity;
+  return range;
 }
 
 }  // namespace lapservo::internal

@@ -4,6 +4,7 @@
 
 #include "lapservo/control/arm_response.h"
 #include "lapservo/control/controller_config.h"
+#include "lapservo/control/motion_limits.h"
 #include "lapservo/robot/joint_path.h"
 
 namespace lapservo::internal {
@@ -24,9 +25,8 @@ class FollowingErrorLimit {
   void restart() { restarted_ = true; }
   /// A setpoint has been at its limit for some time: its joint is blocked, or not where it is measured.
   bool is_reached() const;
-  /// `wanted`, slowed so that no setpoint exceeds its limit; one that does comes back. Within rate and acceleration
-  /// limits.
-  Eigen::Vector4d apply(const Eigen::Vector4d& setpoint_velocity, const Eigen::Vector4d& wanted, double period_s) const;
+  /// Velocities, none beyond `rate`, by which no setpoint exceeds its limit; one that does comes back.
+  VelocityRange range(const Eigen::Vector4d& rate) const;
 
  private:
   JointLimits limits_;

@@ -59,10 +59,9 @@ Eigen::Vector4d brake(const JointLimits& limits, const Eigen::Vector4d& velocity
 LimitedVelocity limit_velocity(const JointLimits& limits, const std::optional<ImageWindow>& window,
                                const MotionState& motion, const std::optional<EndPoints>& ends,
                                const Eigen::Vector4d& wanted, const Eigen::Matrix4d& weight, double period_s,
-                               const std::optional<Eigen::Vector4d>& slower) {
+                               const VelocityRange& range) {
   const Eigen::Vector4d braking = brake(limits, motion.velocity, period_s);
   const double stop_s = stopping_time_s(limits);
-  const Eigen::Vector4d rate = limits.rate.cwiseMin(slower.value_or(limits.rate));
   // Largest speed at the end of the period towards a bound that is `gap` away and approached at `speed`.
   const auto approach = [&](double gap, double speed) {
     return (gap - speed * period_s / 2) / (stop_s + period_s / 2);
@@ -72,8 +71,10 @@ LimitedVelocity limit_velocity(const JointLimits& limits, const std::optional<Im
   for (int i = 0; i < 4; ++i) {
     const double change = limits.acceleration[i] * period_s;
     const double v = motion.velocity[i];
-    const double high = std::min({rate[i], v + change, approach(limits.upper[i] - motion.position[i], v)});
-    const double low = std::min({rate[i], -v + change, approach(motion.position[i] - limits.lower[i], -v)});
+    const double high =
+        std::min({limits.rate[i], range.upper[i], v + change, approach(limits.upper[i] - motion.position[i], v)});
+    const double low =
+        std::min({limits.rate[i], -range.lower[i], -v + change, approach(motion.position[i] - limits.lower[i], -v)});
     bounds.push_back({Eigen::Vector4d::Unit(i), std::max(high, braking[i])});
     bounds.push_back({-Eigen::Vector4d::Unit(i), std::max(low, -braking[i])});
   }
@@ -87,7 +88,16 @@ LimitedVelocity limit_velocity(const JointLimits& limits, const std::optional<Im
       bounds.push_back({-row, std::max(approach(ends->ends_px[i] - lower[i], -speed), -least)});
     }
   }
-  const QpSolution solution = solve_velocity_qp(weight, wanted, bounds, braking);
+  // Where braking is out of the range, so near to it as the other bounds allow.
+  const Eigen::Vector4d in_range = braking.cwiseMax(range.lower).cwiseMin(range.upper),
+                        start = solve_velocity_qp(weight, in_range, bounds, braking).x;
+  for (Eigen::Index i = 0; i < 4; ++i) {
+    HalfSpace* high = bounds.begin() + 2 * i;
+    HalfSpace* low = high + 1;
+    high->bound = std::min(high->bound, std::max(range.upper[i], start[i]));
+    low->bound = std::min(low->bound, std::max(-range.lower[i], -start[i]));
+  }
+  const QpSolution solution = solve_velocity_qp(weight, wanted, bounds, start);
   return {solution.x, solution.constrained};
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <optional>
 #include <string>
 
@@ -43,6 +44,11 @@ double stopping_time_s(const JointLimits& limits);
 /// its whole acceleration.
 Eigen::Vector4d brake(const JointLimits& limits, const Eigen::Vector4d& velocity, double period_s);
 
+/// Velocities that are allowed besides: lower <= v' <= upper.
+struct VelocityRange {
+  Eigen::Vector4d lower = Eigen::Vector4d::Constant(-std::numeric_limits<double>::infinity()), upper = -lower;
+};
+
 struct LimitedVelocity {
   Eigen::Vector4d velocity = Eigen::Vector4d::Zero();
   bool limited = false;  ///< it is not the one wanted
@@ -50,7 +56,7 @@ struct LimitedVelocity {
 
 /// The velocity at the end of the coming period, which ramps linearly to it, that is nearest to `wanted` in the norm of
 /// `weight` and obeys rate, acceleration and position limits and the image window. Position limits of `ends` are left
-/// out when there are none. `slower`: bounds of |v'| below the rate limits, for joints that may go no faster yet.
+/// out when there are none. It lies in `range`, or as near to it as the limits allow.
 ///
 /// Why nothing is ever crossed. Let t_s <= t_m = stopping_time_s be the time that stopping from the velocity v takes, T
 /// the coming period (T <= 2 t_m), and let x be any bounded quantity with gap g = bound - x and speed w towards the
@@ -59,7 +65,7 @@ struct LimitedVelocity {
 /// T (w + w')/2, so the claim reads w' (t_m + T/2) <= g - w T/2, and with w' = w (1 - T/t_s) and g >= w t_m it
 /// follows from T - T t_m/t_s - T^2/(2 t_s) <= 0, true as t_s <= t_m. (For T > t_s the ramp ends at rest after
 /// w T/2 <= w t_m <= g.) The bounds imposed are
-///   |v'_i| <= rate_i (or slower_i),  |v'_i - v_i| <= acceleration_i T,  w' (t_m + T/2) <= g - w T/2,
+///   |v'_i| <= rate_i,  |v'_i - v_i| <= acceleration_i T,  w' (t_m + T/2) <= g - w T/2,
 /// each relaxed to admit braking where the state is already beyond it (the arm was switched on out of range, the end
 /// point moved unexpectedly). Braking satisfies them all, so the feasible set is never empty; every point of it
 /// satisfies the claim's premise again, so a state that starts at rest within the position limits stays within them for
@@ -69,6 +75,6 @@ struct LimitedVelocity {
 LimitedVelocity limit_velocity(const JointLimits& limits, const std::optional<ImageWindow>& window,
                                const MotionState& motion, const std::optional<EndPoints>& ends,
                                const Eigen::Vector4d& wanted, const Eigen::Matrix4d& weight, double period_s,
-                               const std::optional<Eigen::Vector4d>& slower = {});
+                               const VelocityRange& range = {});
 
 }  // namespace lapservo::internal

@@ -42,7 +42,7 @@ struct LinearCamera {
 TEST(MotionLimits, AreNeverCrossedWhateverIsWanted) {
   const JointLimits limits;
   const ImageWindow window{20, 1259, 20, 699};
-  int touched_window = 0, touched_joints = 0;
+  int touched_window = 0, touched_joints = 0, kept = 0;
   for (std::uint64_t seed = 1; seed <= 100; ++seed) {
     SCOPED_TRACE(seed);
     Random random(seed);
@@ -53,6 +53,7 @@ TEST(MotionLimits, AreNeverCrossedWhateverIsWanted) {
     path.reset(0, camera.centre);
     Eigen::Vector4d wanted = Eigen::Vector4d::Zero();
     Eigen::Matrix4d weight = Eigen::Matrix4d::Identity();
+    VelocityRange range;
     for (int k = 0; k < 400; ++k) {
       if (k % 60 == 0) {
         wanted = random.uniform(0, 3) * random_vector(random).cwiseProduct(limits.rate);
@@ -60,11 +61,19 @@ TEST(MotionLimits, AreNeverCrossedWhateverIsWanted) {
         weight = root * root.transpose() + 0.01 * Eigen::Matrix4d::Identity();
       }
       const MotionState before = path.end();
-      const Eigen::Vector4d rate = (k < 300 ? 1 : 0.1) * limits.rate;  // slow from then on, after a motion at any speed
-      const auto next =
-          limit_velocity(limits, window, before, camera.at(before.position), wanted, weight, period_s, rate);
-      const Eigen::Vector4d most = rate.cwiseMax(brake(limits, before.velocity, period_s).cwiseAbs());
-      ASSERT_LE((next.velocity.cwiseAbs() - most).maxCoeff(), 1e-9);
+      if (k % 30 == 0) range.upper = random_vector(random).cwiseProduct(limits.rate);
+      range.lower = range.upper - 2 * limits.rate;
+      const auto limited = [&](const VelocityRange& within) {
+        return limit_velocity(limits, window, before, camera.at(before.position), wanted, weight, period_s, within);
+      };
+      const auto next = limited(range), freely = limited({});
+      const Eigen::Vector4d braking = brake(limits, before.velocity, period_s), high = range.upper.cwiseMax(braking),
+                            low = range.lower.cwiseMin(braking);
+      ASSERT_LE((next.velocity - high).cwiseMax(low - next.velocity).maxCoeff(), 1e-9);
+      if ((freely.velocity - range.upper).cwiseMax(range.lower - freely.velocity).maxCoeff() < 0) {
+        ++kept;
+        ASSERT_LE((next.velocity - freely.velocity).norm(), 1e-9);
+      }
       const Eigen::Vector4d acceleration = (next.velocity - before.velocity) / period_s;
       ASSERT_LE((acceleration.cwiseAbs() - limits.acceleration).maxCoeff(), 1e-9);
       path.ramp_to(k * period_s, next.velocity, period_s);
@@ -82,6 +91,7 @@ TEST(MotionLimits, AreNeverCrossedWhateverIsWanted) {
   }
   EXPECT_GT(touched_window, 1000);
   EXPECT_GT(touched_joints, 1000);
+  EXPECT_GT(kept, 1000);
 }
 
 TEST(MotionLimits, NameTheOneThatStopsTheArm) {

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <optional>
+#include <string>
 
 #include "lapservo/control/newton_inverse.h"
 #include "lapservo/control/tracking_law.h"
@@ -62,7 +64,7 @@ JointVector random_start(const Trajectory& trajectory, double duration_s, const 
                          const ControllerConfig& config, const Eigen::Vector4d& joint_offset, Random& random,
                          const std::string& source) {
   constexpr int max_places = 100000, max_starts = 60;
-  std::string why = "no place in view lies within the joint limits";
+  std::map<std::string, int> problems;  // and of how many starts
   int starts = 0;
   for (int i = 0; i < max_places && starts < max_starts; ++i) {
     Eigen::Vector4d q;
@@ -70,14 +72,16 @@ JointVector random_start(const Trajectory& trajectory, double duration_s, const 
     if (!in_view(model, config.window.value(), q + joint_offset)) continue;
     ++starts;
     if (const auto problem = find_problem(trajectory, duration_s, model, config, q, q + joint_offset)) {
-      why = problem->text();
+      ++problems[problem->text()];
       continue;
     }
     const auto goal = newton_inverse(model, trajectory.at(0).features, q, config.scales);
     if (goal && goal->converged && !seam_lies_between(model, q, goal->q)) return JointVector::from_vector(q);
-    why = "the marker's seam lies between every start and the trajectory";
+    ++problems["the marker's seam lies between the start and the trajectory"];
   }
-  throw InputError(source, why);
+  const auto usual = std::max_element(problems.begin(), problems.end(),
+                                      [](const auto& a, const auto& b) { return a.second < b.second; });
+  throw InputError(source, starts == 0 ? "no place in view lies within the joint limits" : usual->first);
 }
 
 }  // namespace lapservo::internal

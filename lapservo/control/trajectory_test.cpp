@@ -2,10 +2,12 @@
 
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <string>
 
 #include <gtest/gtest.h>
 
+#include "lapservo/control/random_start.h"
 #include "lapservo/control/test_simulator.h"
 #include "lapservo/control/trajectory_check.h"
 #include "lapservo/core/angles.h"
@@ -146,6 +148,14 @@ TEST_F(TrajectoryCheck, NamesTimeAndLimit) {
   expect_problem(sinusoids(paper_sinusoids()), near_joint_limit, "limits.upper rho_m 0.066");
   expect_problem(sinusoids(paper_sinusoids()), narrow_window, "field of view");
   expect_problem(set_point({0.9, 795, 365, 900}), config, "");
+  narrow_window.window->u_max_px = 700;
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    Random random(seed);
+    const auto draw = [&] {
+      random_start(set_point(paper_sinusoids().offset), 1, model, narrow_window, Eigen::Vector4d::Zero(), random, "");
+    };
+    EXPECT_NE(testing::input_error(draw).find("field of view"), std::string::npos) << "keeps most starts from it";
+  }
 }
 
 TEST(Trajectory, OfTheTipPassesItsPlacesAndTurnsTheShorterWay) {

@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "lapservo/control/gap_crossing.h"
-#include "lapservo/control/motion_limits.h"
 #include "lapservo/control/tracking_law.h"
 
 namespace lapservo::internal {
@@ -28,16 +27,6 @@ bool all_finite(const ImageMeasurement& image) {
          (!image.camera_from_marker ||
           (image.camera_from_marker->translation.allFinite() &&
            image.camera_from_marker->rotation.coeffs().allFinite() && image.ends_px.allFinite()));
-}
-
-// Slower along the same line, so that a far goal is approached straight.
-Eigen::Vector4d slow_to_rate(const Eigen::Vector4d& velocity, const Eigen::Vector4d& rate) {
-  const double times = velocity.cwiseAbs().cwiseQuotient(rate).maxCoeff();
-  return times > 1 ? Eigen::Vector4d(velocity / times) : velocity;
-}
-
-EndPoints ends_at(const Estimate& now, const Eigen::Vector4d& ahead) {
-  return {now.ends_px + now.ends_jacobian * ahead, now.ends_jacobian};
 }
 
 }  // namespace
@@ -107,14 +96,19 @@ ControlStep VisualController::step(double time_s, const Eigen::Vector4d& q_joint
   if (step.reason == HoldReason::none && !(image_s_ >= needed_since_s_)) step.reason = HoldReason::stale_image;
   if (follows_ && step.reason == HoldReason::none && suspended_ == HoldReason::none) step.reason = until_start_;
   if (step.reason == HoldReason::image_not_following) step.unanswered = image_response_.unanswered();
+  if (step.reason == HoldReason::error_grows) step.stops_at = grows_at_;
 
-  const Law law = decide(step.reason, step.estimate, desired);
+  const Law law = decide(step.reason, q_joint, step.estimate, desired);
   step.reason = law.reason;
   step.velocity = brake(config_.limits, path_.at(now_s_).velocity, config_.period_s);
   if (step.estimate && all_finite(desired)) step.error = feature_error(step.estimate->features, desired.features);
-  if (step.reason == HoldReason::none && law.action == ControlAction::track && follows_)
-    step.stops_at = stops_at(law, q_joint, desired, step);
-  if (step.stops_at) step.reason = HoldReason::goal_beyond_limit;
+  if (step.reason == HoldReason::none && law.action == ControlAction::track && follows_) {
+    const Eigen::Matrix4d& jacobian = step.estimate->jacobian;
+    const bool stopped =
+        limited_goal_.add(desired, step.error, jacobian * law.velocity, jacobian * (law.velocity - law.stop.left),
+                          jacobian * path_.at(now_s_).velocity, config_.period_s);
+    if (stopped && law.stop.at) step.stops_at = law.stop.at, step.reason = HoldReason::goal_beyond_limit;
+  }
   if (step.reason == HoldReason::none) {
     limit(law, q_joint, step);
   } else if (measured_) {
@@ -133,6 +127,7 @@ ControlStep VisualController::step(double time_s, const Eigen::Vector4d& q_joint
     error_growth_.restart();
   } else if (tracks && error_growth_.add(desired, step.error)) {
     until_start_ = HoldReason::error_grows;
+    grows_at_ = law.stop.at;
   }
   return step;
 }
@@ -228,7 +223,8 @@ HoldReason VisualController::by_their_rate(HoldReason reason) const {
   return usable && slow_images_.are_slow() ? HoldReason::slow_images : reason;
 }
 
-VisualController::Law VisualController::decide(HoldReason reason, const std::optional<Estimate>& estimate,
+VisualController::Law VisualController::decide(HoldReason reason, const Eigen::Vector4d& q_joint,
+                                               const std::optional<Estimate>& estimate,
                                                const DesiredFeatures& desired) const {
   if (reason != HoldReason::none || suspended_ != HoldReason::none)
     return {.reason = reason == HoldReason::none ? suspended_ : reason};
@@ -240,6 +236,7 @@ VisualController::Law VisualController::decide(HoldReason reason, const std::opt
                                    .weight = joint_weight_}
                              : tracking_law(estimate, desired);
   if (!law.velocity.allFinite() || !law.weight.allFinite()) law.reason = HoldReason::non_finite;
+  if (law.reason == HoldReason::none) slow(law, q_joint, estimate);
   return law;
 }
 
@@ -270,51 +267,46 @@ VisualController::Law VisualController::tracking_law(const std::optional<Estimat
   return law;
 }
 
-/// The limit that keeps the arm from its goal, as soon as that is plain.
-std::optional<PositionLimit> VisualController::stops_at(const Law& law, const Eigen::Vector4d& q_joint,
-                                                        const DesiredFeatures& desired, const ControlStep& step) {
-  const MotionState motion = path_.at(now_s_);
-  const Eigen::Vector4d wanted = slow_to_rate(law.velocity, law.rate);
-  const Stop stop = stop_at({config_.limits, config_.window}, config_.scales, motion.position,
-                            ends_at(*step.estimate, motion.position - q_joint), wanted, law.weight);
-  const Eigen::Matrix4d& jacobian = step.estimate->jacobian;
-  const bool stopped = limited_goal_.add(desired, step.error, jacobian * wanted, jacobian * (wanted - stop.left),
-                                         jacobian * motion.velocity, config_.period_s);
-  return stopped ? stop.at : std::nullopt;
+// Slower along the same line, so that a far goal is approached straight. A joint at its limit slows no other.
+void VisualController::slow(Law& law, const Eigen::Vector4d& q_joint, const std::optional<Estimate>& estimate) const {
+  const Eigen::Vector4d position = path_.at(now_s_).position;
+  if (estimate) {
+    const Eigen::Matrix4d& jacobian = estimate->ends_jacobian;
+    law.ends = EndPoints{estimate->ends_px + jacobian * (position - q_joint), jacobian};
+  }
+  law.stop = stop_at({config_.limits, config_.window}, config_.scales, position, law.ends.value_or(EndPoints()),
+                     law.velocity, law.weight);
+  const double times = law.stop.left.cwiseAbs().cwiseQuotient(law.rate).maxCoeff();
+  law.is_slowed = times > 1;
+  if (law.is_slowed) law.velocity /= times, law.stop.left /= times;
 }
 
 /// The law's velocity, as far as the limits allow it.
 void VisualController::limit(const Law& law, const Eigen::Vector4d& q_joint, ControlStep& step) const {
   const MotionState motion = path_.at(now_s_);
-  const Eigen::Vector4d slowed = slow_to_rate(law.velocity, law.rate);
-  Eigen::Vector4d wanted = slowed;
-  std::optional<EndPoints> ends;
+  Eigen::Vector4d wanted = law.velocity;
   if (step.estimate) {
-    const Estimate& now = *step.estimate;
-    ends = ends_at(now, motion.position - q_joint);
     JointLimits confirmed = config_.limits;
     confirmed.rate = confirmed.rate.cwiseMin(law.rate);
-    wanted = cross_gaps(confirmed, motion, now.gap, arm_response_.drive(), q_joint, law.feed_forward, slowed,
+    wanted = cross_gaps(confirmed, motion, step.estimate->gap, arm_response_.drive(), q_joint, law.feed_forward, wanted,
                         config_.period_s);
   }
-  wanted = following_error_limit_.apply(motion.velocity, wanted, config_.period_s);
-  const auto limited =
-      limit_velocity(config_.limits, config_.window, motion, ends, wanted, law.weight, config_.period_s, law.rate);
+  const auto limited = limit_velocity(config_.limits, config_.window, motion, law.ends, wanted, law.weight,
+                                      config_.period_s, following_error_limit_.range(law.rate));
   if (!limited.velocity.allFinite()) {
     step.reason = HoldReason::non_finite;
     return;
   }
   step.velocity = limited.velocity;
-  step.limited = limited.limited || slowed != law.velocity;
+  step.limited = limited.limited || law.is_slowed;
   step.action = law.action;
 }
 
 /// Brakes, except where setpoints have to come back to a joint that did not follow.
 Eigen::Vector4d VisualController::limited_hold(const Eigen::Vector4d& braking) const {
-  const MotionState motion = path_.at(now_s_);
-  const Eigen::Vector4d wanted = following_error_limit_.apply(motion.velocity, braking, config_.period_s);
-  if (wanted == braking) return braking;
-  return limit_velocity(config_.limits, {}, motion, {}, wanted, joint_weight_, config_.period_s).velocity;
+  return limit_velocity(config_.limits, {}, path_.at(now_s_), {}, braking, joint_weight_, config_.period_s,
+                        following_error_limit_.range(config_.limits.rate))
+      .velocity;
 }
 
 }  // namespace lapservo::internal

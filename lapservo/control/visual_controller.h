@@ -20,6 +20,7 @@
 #include "lapservo/control/image_measurement.h"
 #include "lapservo/control/image_response.h"
 #include "lapservo/control/joint_history.h"
+#include "lapservo/control/motion_limits.h"
 #include "lapservo/control/standing_goal.h"
 #include "lapservo/control/trajectory.h"
 #include "lapservo/control/wild_joints.h"
@@ -103,9 +104,12 @@ class VisualController {
     HoldReason reason = HoldReason::none;
     ControlAction action = ControlAction::track;
     Eigen::Vector4d velocity = Eigen::Vector4d::Zero();
-    Eigen::Vector4d rate = Eigen::Vector4d::Ones();          ///< beyond which it is slowed
+    Eigen::Vector4d rate = Eigen::Vector4d::Ones();          ///< no joint is faster
     Eigen::Vector4d feed_forward = Eigen::Vector4d::Zero();  ///< the part of it that the desired motion alone requires
     Eigen::Matrix4d weight = Eigen::Matrix4d::Identity();    ///< of deviations from it
+    std::optional<EndPoints> ends{};                         ///< at the setpoint
+    Stop stop{};                                             ///< what limits of position leave of it
+    bool is_slowed = false;                                  ///< for the rate
   };
 
   HoldReason read(double time_s, const Eigen::Vector4d& q_joint, const DesiredFeatures& desired,
@@ -113,10 +117,10 @@ class VisualController {
   void remember(double time_s, const Eigen::Vector4d& q_joint, std::span<const JointReading> readings);
   HoldReason update(const ImageMeasurement& image);
   HoldReason by_their_rate(HoldReason reason) const;
-  Law decide(HoldReason reason, const std::optional<Estimate>& estimate, const DesiredFeatures& desired) const;
+  Law decide(HoldReason reason, const Eigen::Vector4d& q_joint, const std::optional<Estimate>& estimate,
+             const DesiredFeatures& desired) const;
   Law tracking_law(const std::optional<Estimate>& estimate, const DesiredFeatures& desired) const;
-  std::optional<PositionLimit> stops_at(const Law& law, const Eigen::Vector4d& q_joint, const DesiredFeatures& desired,
-                                        const ControlStep& step);
+  void slow(Law& law, const Eigen::Vector4d& q_joint, const std::optional<Estimate>& estimate) const;
   void limit(const Law& law, const Eigen::Vector4d& q_joint, ControlStep& step) const;
   Eigen::Vector4d limited_hold(const Eigen::Vector4d& braking) const;
 
@@ -132,6 +136,7 @@ class VisualController {
   ErrorGrowth error_growth_;
   LimitedGoal limited_goal_;
   HoldReason until_start_ = HoldReason::none;  ///< a reason that only an operator ends
+  std::optional<PositionLimit> grows_at_;      ///< with error_grows
   WildJoints wild_joints_;
   JointPath path_;
   HoldReason suspended_ = HoldReason::none;

@@ -249,8 +249,8 @@ TEST(VisualController, NoJointIsFasterThanImagesHaveConfirmed) {
   EXPECT_NEAR(fastest, 1, 1e-9);
 }
 
-// Goals between which and the start a joint has its limit are said until another goal is given, but where the way
-// along the limit leads past the marker's seam; those on limits are reached.
+// Goals beyond a joint's limit, which is on the way or where the arm starts, are said until another goal is given, or
+// until a start where the way along the limit leads past the marker's seam; those on limits are reached.
 TEST(VisualController, SaysWhichLimitKeepsItFromItsGoal) {
   const Flaws flaws = usual_flaws();
   int said = 0;
@@ -272,15 +272,23 @@ TEST(VisualController, SaysWhichLimitKeepsItFromItsGoal) {
     Eigen::Index joint = 0;
     (there - start).cwiseQuotient(config.scales.joints).cwiseAbs().maxCoeff(&joint);
     const bool upper = there[joint] > start[joint];
-    (upper ? config.limits.upper : config.limits.lower)[joint] = (start[joint] + there[joint]) / 2;
+    (upper ? config.limits.upper : config.limits.lower)[joint] =
+        seed % 2 ? start[joint] : (start[joint] + there[joint]) / 2;
     VisualController controller(config, testing::model_of({}));
     TestSimulator simulator({}, flaws, start, seed);
-    const Moment held = simulator.run(controller, goal(there), 15).back();
+    const Moments moments = simulator.run(controller, goal(there), 15);
+    const Moment& held = moments.back();
     EXPECT_TRUE(held.step.velocity.isZero());
+    ASSERT_TRUE(held.step.stops_at);
+    EXPECT_EQ(std::pair(held.step.stops_at->of, held.step.stops_at->upper), std::pair(joint, upper));
     if (held.step.reason == HoldReason::error_grows) continue;
     ASSERT_EQ(held.step.reason, HoldReason::goal_beyond_limit);
     ++said;
-    EXPECT_EQ(std::pair(held.step.stops_at->of, held.step.stops_at->upper), std::pair(joint, upper));
+    for (std::size_t k = 1; k + 60 < moments.size(); ++k) {
+      const Eigen::Vector4d change = (moments[k].step.velocity - moments[k - 1].step.velocity) / config.period_s;
+      const bool ends = moments[k].step.reason == HoldReason::none && moments[k + 60].step.reason != HoldReason::none;
+      ASSERT_LE(ends * change.cwiseQuotient(config.limits.acceleration).cwiseAbs().maxCoeff(), 0.5) << "it trembles";
+    }
     EXPECT_EQ(simulator.run(controller, goal(start), 0.1).front().step.reason, HoldReason::none);
   }
   EXPECT_GE(said, 23);

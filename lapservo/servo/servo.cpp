@@ -19,6 +19,10 @@ const Eigen::Vector4d at_rest(0.002, 0.002, 0.0003, 0.01);
 
 constexpr int contradicted_after = 10;
 
+std::string limit_text(const PositionLimit& limit, const ControllerConfig& config) {
+  return PositionBounds(config.limits, config.window).text(limit);
+}
+
 std::string unanswered_text(const Unanswered& found, const std::array<std::string, 4>& names, ControlMode mode) {
   const std::string& name = names[static_cast<std::size_t>(found.joint)];
   constexpr double other_way = -0.5;
@@ -49,6 +53,10 @@ std::string remedy_of(const ControlStep& control, const std::array<std::string, 
     case HoldReason::image_not_following:
       return control.unanswered ? unanswered_text(*control.unanswered, names, mode) : "";
     case HoldReason::error_grows:
+      if (control.stops_at)
+        return limit_text(*control.stops_at, config) +
+               " keeps the arm from its goal, and its way along that limit leads away: give another goal, then say "
+               "start. Where the goal needs no such place, check joints.sign and camera_from_rcm";
       return mode == ControlMode::uncalibrated
                  ? "the arm moves away from its goal: run servo again, which learns the image's motion anew"
                  : "the arm moves away from its goal: check joints.sign, camera_from_rcm and whose image it is";
@@ -61,9 +69,9 @@ std::string remedy_of(const ControlStep& control, const std::array<std::string, 
       return "the shaft can't hold the tip at its goal with the wrist as it is: straighten the wrist, or give another "
              "goal";
     case HoldReason::goal_beyond_limit:
-      return control.stops_at ? PositionBounds(config.limits, config.window).text(*control.stops_at) +
-                                    " keeps the arm from its goal: give another goal"
-                              : "";
+      return control.stops_at
+                 ? limit_text(*control.stops_at, config) + " keeps the arm from its goal: give another goal"
+                 : "";
     default:
       return "";
   }
