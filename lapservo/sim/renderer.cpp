@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "lapservo/geometry/field_of_view.h"
+#include "lapservo/sim/chromatic_aberration.h"
 #include "lapservo/sim/optics.h"
 #include "lapservo/sim/outline.h"
 #include "lapservo/sim/sensor.h"
@@ -41,6 +42,7 @@ class Renderer::State {
         half_field_rad_(half_field_rad(camera)),
         shafts_(std::move(shafts)),
         options_(options),
+        aberration_px_(aberration_reach_px(camera)),
         optics_(options.sensor.blur_px),
         encoder_(camera.response, options.sensor),
         rays_(camera) {
@@ -48,6 +50,12 @@ class Renderer::State {
               background.rows == camera.height_px);
     background_light_ = background.clone();
     scene_.light = background.clone();
+    lens_background_ = background_light_;
+    if (aberration_px_ > 0) {
+      lens_light_ = background.clone();
+      aberrate(camera_, background_light_, {{0, 0}, background.size()}, lens_light_);
+      lens_background_ = lens_light_.clone();
+    }
     const bool has_tools =
         std::any_of(shafts_.begin(), shafts_.end(), [](const ShaftModel& shaft) { return shaft.tool.has_value(); });
     if (shafts_.size() > 1 || has_tools) {
@@ -61,7 +69,7 @@ class Renderer::State {
     std::vector<cv::Rect> drawn;
     if (exposure.size() == 1) {
       drawn = draw(exposure.front());
-      for (const cv::Rect& part : drawn) develop(scene_.light, part, frame_);
+      develop_parts(scene_.light, drawn);
       clear(drawn);
     } else {
       cv::Mat exposed = background_light_.clone();
@@ -73,7 +81,7 @@ class Renderer::State {
         drawn.insert(drawn.end(), now.begin(), now.end());
       }
       drawn = without_overlap(std::move(drawn));
-      for (const cv::Rect& part : drawn) develop(exposed, part, frame_);
+      develop_parts(exposed, drawn);
     }
     const cv::Mat image = encoder_.expose(frame_, seed);
     for (const cv::Rect& part : drawn) {
@@ -97,13 +105,13 @@ class Renderer::State {
  private:
   void develop_background() {
     background_ = encoder_.allocate(background_light_.size());
-    develop(background_light_, cv::Rect({0, 0}, background_light_.size()), background_);
+    develop(lens_background_, cv::Rect({0, 0}, background_light_.size()), background_);
     frame_ = {background_.value.clone(), background_.sigma.clone()};
   }
 
   std::vector<cv::Rect> draw(const std::vector<ShaftPlacement>& placements) {
     std::vector<cv::Rect> drawn;
-    const double margin_px = optics_.reach_px() + 1;
+    const double margin_px = optics_.reach_px() + aberration_px_ + 1;
     const auto paint = [&](const std::vector<Capsule>& things, auto painter) {
       for (const cv::Rect& part : outline(camera_, half_field_rad_, things, margin_px)) {
         painter.paint(rays_, part, background_light_, scene_);
@@ -134,6 +142,17 @@ class Renderer::State {
     }
   }
 
+  // Parts of the frame, as the lens shows them.
+  void develop_parts(const cv::Mat& light, const std::vector<cv::Rect>& drawn) {
+    if (aberration_px_ == 0) {
+      for (const cv::Rect& part : drawn) develop(light, part, frame_);
+      return;
+    }
+    for (const cv::Rect& part : drawn) aberrate(camera_, light, part, lens_light_);
+    for (const cv::Rect& part : drawn) develop(lens_light_, part, frame_);
+    for (const cv::Rect& part : drawn) lens_background_(part).copyTo(lens_light_(part));
+  }
+
   // Blurs, veils and encodes a part. A veil is even: it may come after the blur.
   void develop(const cv::Mat& light, const cv::Rect& part, SensorEncoder::Encoded& encoded) {
     const float clear = 1 - options_.smoke, veil = smoke_light * options_.smoke;
@@ -152,11 +171,13 @@ class Renderer::State {
   double half_field_rad_;
   std::vector<ShaftModel> shafts_;
   RenderOptions options_;
+  int aberration_px_;
   Optics optics_;
   SensorEncoder encoder_;
   PixelRays rays_;
   SceneLight scene_;                           // the frame being drawn
   cv::Mat background_light_;                   // sharp
+  cv::Mat lens_background_, lens_light_;       // with the lens's chromatic aberration; the latter only where it has one
   SensorEncoder::Encoded background_, frame_;  // blurred and encoded
   std::vector<float> veiled_;
 };

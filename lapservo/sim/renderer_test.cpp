@@ -1,10 +1,12 @@
 #include "lapservo/sim/renderer.h"
 
 #include <algorithm>
+#include <array>
 #include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <opencv2/imgproc.hpp>
 
 #include "lapservo/core/angles.h"
 #include "lapservo/core/random.h"
@@ -63,6 +65,23 @@ ShaftModel askew_shaft(double wrap_m, double gap_rad) {
   ShaftModel shaft = short_shaft();
   shaft.marker.wrap_m = wrap_m, shaft.marker.gap_rad = gap_rad;
   return shaft;
+}
+
+TEST(Renderer, MagnifiesRedAndBlueByTheLensesAberration) {
+  Camera lens = small_camera();
+  lens.chromatic_aberration = {1.01, 0.99};
+  const auto bgr = [&](const Camera& camera) {
+    std::array<cv::Mat, 3> channels;
+    cv::split(renderer_of({short_shaft()}, 0.1F, camera).render({across_the_view(0.4, 1)}, 1), channels.data());
+    return channels;
+  };
+  const auto plain = bgr(small_camera()), aberrated = bgr(lens);
+  for (const auto& [channel, times] : {std::pair(0U, 1.01), std::pair(1U, 1.0), std::pair(2U, 0.99)}) {
+    const cv::Matx23d magnify(times, 0, lens.cx_px * (1 - times), 0, times, lens.cy_px * (1 - times));
+    cv::Mat expected;
+    cv::warpAffine(plain[channel], expected, magnify, plain[channel].size(), cv::INTER_CUBIC, cv::BORDER_REPLICATE);
+    EXPECT_LE(max_difference(aberrated[channel], expected), times == 1 ? 0 : 8) << channel;
+  }
 }
 
 TEST(Renderer, BoundariesLieWhereKinematicsSays) {

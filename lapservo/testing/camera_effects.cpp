@@ -11,6 +11,7 @@
 #include "lapservo/core/random.h"
 #include "lapservo/io/image_file.h"
 #include "lapservo/io/pictures/jpeg_picture.h"
+#include "lapservo/sim/chromatic_aberration.h"
 
 namespace lapservo::effects {
 using namespace internal;
@@ -31,25 +32,6 @@ void map_values(cv::Mat& picture, const std::function<double(double)>& function)
     const float* const entry = table.data() + i;
     values[at] = entry[0] + (place - static_cast<float>(i)) * (entry[1] - entry[0]);
   }
-}
-
-cv::Mat magnified(const cv::Mat& channel, double magnification, const Camera& camera) {
-  const double inverse = 1 / magnification;
-  const cv::Mat source_from_target =
-      (cv::Mat_<double>(2, 3) << inverse, 0, camera.cx_px * (1 - inverse), 0, inverse, camera.cy_px * (1 - inverse));
-  cv::Mat out;
-  cv::warpAffine(channel, out, source_from_target, channel.size(), cv::INTER_LANCZOS4 | cv::WARP_INVERSE_MAP,
-                 cv::BORDER_REPLICATE);
-  return out;
-}
-
-void aberrate(cv::Mat& light, const ChromaticAberration& aberration, const Camera& camera) {
-  if (aberration == ChromaticAberration{}) return;
-  std::array<cv::Mat, 3> channels;
-  cv::split(light, channels.data());
-  channels[0] = magnified(channels[0], aberration.blue, camera);
-  channels[2] = magnified(channels[2], aberration.red, camera);
-  cv::merge(channels.data(), channels.size(), light);
 }
 
 void vignette(cv::Mat& light, double fraction, const Camera& camera) {
@@ -152,8 +134,11 @@ Response response_of(const CameraEffects& effects) {
 }  // namespace
 
 cv::Mat seen_through(const CameraEffects& effects, const cv::Mat& srgb, const Camera& camera) {
-  cv::Mat picture = light_of(srgb);
-  aberrate(picture, effects.aberration, camera);
+  const cv::Mat sharp = light_of(srgb);
+  cv::Mat picture = sharp.clone();
+  Camera lens = camera;
+  lens.chromatic_aberration = effects.aberration;
+  aberrate(lens, sharp, {{0, 0}, sharp.size()}, picture);
   vignette(picture, effects.vignette, camera);
   cross_talk(picture, effects.crosstalk);
   if (effects.mosaic) demosaic(picture);

@@ -1,0 +1,37 @@
+#include "lapservo/sim/chromatic_aberration.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include <opencv2/imgproc.hpp>
+
+namespace lapservo::internal {
+
+int aberration_reach_px(const Camera& camera) {
+  constexpr int lanczos_px = 4;
+  const auto& [blue, red] = camera.chromatic_aberration;
+  const double magnified = std::max(std::abs(blue - 1), std::abs(red - 1));
+  if (magnified == 0) return 0;
+  const double corner_px = std::hypot(std::max(camera.cx_px, camera.width_px - camera.cx_px),
+                                      std::max(camera.cy_px, camera.height_px - camera.cy_px));
+  return static_cast<int>(std::ceil(magnified * corner_px)) + lanczos_px;
+}
+
+void aberrate(const Camera& camera, const cv::Mat& light, const cv::Rect& part, cv::Mat& out) {
+  light(part).copyTo(out(part));
+  const auto& [blue, red] = camera.chromatic_aberration;
+  for (const auto& [channel, magnification] : {std::pair(0, blue), std::pair(2, red)}) {
+    if (magnification == 1) continue;
+    const double scale = 1 / magnification;
+    const cv::Matx23d light_from_part(scale, 0, scale * part.x + camera.cx_px * (1 - scale),  //
+                                      0, scale, scale * part.y + camera.cy_px * (1 - scale));
+    cv::Mat magnified, to = out(part);
+    cv::warpAffine(light, magnified, light_from_part, part.size(), cv::INTER_LANCZOS4 | cv::WARP_INVERSE_MAP,
+                   cv::BORDER_REPLICATE);
+    cv::mixChannels({magnified}, {to}, {channel, channel});
+  }
+}
+
+}  // namespace lapservo::internal
