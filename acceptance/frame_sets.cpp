@@ -115,10 +115,8 @@ std::vector<TrueFrame> stored_frames(const std::string& set) {
 
 Score score_single(const std::vector<TrueFrame>& frames) {
   Score score;
-  for (const TrueFrame& frame : frames) {
-    Tracker tracker(frame.rig, {.method = Method::surface, .single = true});
-    score.add(frame, tracker.track(frame.bgr));
-  }
+  for (const TrueFrame& frame : frames)
+    score.add(frame, Tracker(frame.rig, {.method = Method::surface, .single = true}).track(frame.bgr));
   return score;
 }
 
@@ -169,18 +167,20 @@ std::vector<TrueFrame> rendered_frames(const RenderedSet& set) {
 namespace {
 
 // The command as anybody would call it: its chroma is sited where its scaler puts it.
-void record_by_ffmpeg(const std::vector<TrueFrame>& frames, const fs::path& path) {
+const std::map<Encoder, std::string> ffmpeg_options{
+    {Encoder::ffmpeg, "libx264 -crf 16 -pix_fmt yuv420p"},
+    {Encoder::x265, "libx265 -x265-params log-level=none -pix_fmt yuv420p"},
+    {Encoder::x265_rgb, "libx265 -x265-params log-level=none"}};
+void record_by_ffmpeg(const std::vector<TrueFrame>& frames, const std::string& codec, const fs::path& path) {
   const cv::Size size = frames.at(0).bgr.size();
   const std::string command = "ffmpeg -v error -f rawvideo -pix_fmt bgr24 -r 30 -s " + std::to_string(size.width) +
-                              "x" + std::to_string(size.height) + " -i - -c:v libx264 -crf 16 -pix_fmt yuv420p " +
-                              path.string();
+                              "x" + std::to_string(size.height) + " -i - -c:v " + codec + " " + path.string();
   FILE* const to = popen(command.c_str(), "w");
   if (to == nullptr) throw std::runtime_error("ffmpeg can't be started");
   bool written = true;
   for (const TrueFrame& frame : frames)
-    for (int row = 0; row < size.height; ++row)
-      written = written && std::fwrite(frame.bgr.ptr(row), 3, static_cast<std::size_t>(size.width), to) ==
-                               static_cast<std::size_t>(size.width);
+    written = written &&
+              std::fwrite(frame.bgr.clone().data, frame.bgr.elemSize(), frame.bgr.total(), to) == frame.bgr.total();
   if (pclose(to) != 0 || !written) throw std::runtime_error("failed (installed?): " + command);
 }
 
@@ -193,8 +193,8 @@ void compress(std::vector<TrueFrame>& frames, Encoder encoder) {
     VideoWriter writer(path, 30);
     for (const TrueFrame& frame : frames) writer.add(frame.bgr);
     writer.commit();
-  } else if (encoder == Encoder::ffmpeg) {
-    record_by_ffmpeg(frames, path);
+  } else if (encoder != Encoder::opencv) {
+    record_by_ffmpeg(frames, ffmpeg_options.at(encoder), path);
   } else {
     // cv::VideoWriter's own choice is MPEG-4 part 2.
     cv::VideoWriter writer(path.string(), cv::CAP_FFMPEG, cv::VideoWriter::fourcc('a', 'v', 'c', '1'), 30,

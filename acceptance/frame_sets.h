@@ -75,9 +75,9 @@ struct RenderedSet {
 };
 std::vector<TrueFrame> rendered_frames(const RenderedSet& set);
 
-/// The frames as a video of theirs gives them back: libx264, 30 frames/s, as OpenCV sets it up (preset medium, crf 23),
-/// as lapservo does (ultrafast, 22), or as recorded by the command ffmpeg (medium, 16, as in shared/frames/video).
-enum class Encoder { opencv, lapservo, ffmpeg };
+/// The frames as a video gives them back, 30 frames/s: of libx264 by OpenCV (preset medium, crf 23), lapservo
+/// (ultrafast, 22), the command ffmpeg (medium, 16, as in shared/frames/video); of libx265 (medium, 28), 4:2:0 or RGB.
+enum class Encoder { opencv, lapservo, ffmpeg, x265, x265_rgb };
 void compress(std::vector<TrueFrame>& frames, Encoder encoder = Encoder::opencv);
 
 /// The rig of configs/example.yaml.

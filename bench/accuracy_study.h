@@ -18,8 +18,8 @@ struct Row {
 
 /// Rendered frames through what cameras do to them, of a strength drawn anew for every frame, by a rig as calibration
 /// would have it and, "_uncalibrated", as if nobody had calibrated. LAPSERVO_OFF=1: each frame's print is off in its
-/// bands, 2: in an ink that lies aside (random_print.h). LAPSERVO_BLOOD: so much of the marker is hidden [%]. h264 is a
-/// marker in motion, tracked, as a recorder keeps it.
+/// bands, 2: in an ink that lies aside (random_print.h). LAPSERVO_BLOOD: so much of the marker is hidden [%]. h264 and
+/// x265 are a marker in motion, tracked, as recorders keep it; blended is 0.6 of a frame and 0.4 of the one before.
 std::vector<Row> camera_rows();
 /// The same of the ray-traced samples of rotation, illumination and tilt, where they are there.
 std::vector<Row> samples_rows();

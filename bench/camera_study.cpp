@@ -1,4 +1,7 @@
 #include <cmath>
+#include <optional>
+
+#include <opencv2/core.hpp>
 
 #include "bench/accuracy_study.h"
 #include "lapservo/core/angles.h"
@@ -84,9 +87,10 @@ std::vector<Row> rows_of(Frames frames_of) {
   return rows;
 }
 
-// To and fro between two poses, through libavcodec.
-Score score_video(int count, std::uint64_t seed) {
+// To and fro between two poses, over a part of the way, through libavcodec or added to a share of the frame before.
+Score score_video(double part, std::optional<Encoder> encoder, int count, std::uint64_t seed) {
   constexpr int frames_each = 30;
+  constexpr double of_last = 0.4;
   Score score;
   for (int i = 0; i * frames_each < count; ++i) {
     RenderedSet set;
@@ -96,9 +100,11 @@ Score score_video(int count, std::uint64_t seed) {
     const Eigen::Vector4d from = ends[0][0].vector(), to = ends[1][0].vector();
     for (int k = 0; k < frames_each; ++k)
       set.configurations.push_back(
-          {JointVector::from_vector(from + (to - from) * (0.5 - 0.5 * std::cos(two_pi * k / frames_each)) / 4)});
+          {JointVector::from_vector(from + (to - from) * (0.5 - 0.5 * std::cos(two_pi * k / frames_each)) * part)});
     auto frames = rendered_frames(set);
-    compress(frames);
+    if (encoder) compress(frames, *encoder);
+    for (std::size_t k = frames.size(); !encoder && k-- > 1;)
+      cv::addWeighted(frames[k].bgr, 1 - of_last, frames[k - 1].bgr, of_last, 0, frames[k].bgr);
     Tracker tracker(set.rig);
     for (const TrueFrame& frame : frames) score.add(frame, tracker.track(frame.bgr));
   }
@@ -109,7 +115,14 @@ Score score_video(int count, std::uint64_t seed) {
 
 std::vector<Row> camera_rows() {
   std::vector<Row> rows = rows_of(still_frames);
-  rows.push_back({"h264", score_video});
+  constexpr double slow = 0.25, fast = 1;
+  const auto add_video = [&](const std::string& name, double part, std::optional<Encoder> encoder) {
+    rows.push_back({name, [=](int count, std::uint64_t seed) { return score_video(part, encoder, count, seed); }});
+  };
+  add_video("h264", slow, Encoder::opencv);
+  add_video("x265", slow, Encoder::x265);
+  add_video("x265_rgb", slow, Encoder::x265_rgb);
+  add_video("blended", fast, std::nullopt);
   return rows;
 }
 
