@@ -1,7 +1,6 @@
 #include "lapservo/sim/chromatic_aberration.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <utility>
 
@@ -20,17 +19,23 @@ int aberration_reach_px(const Camera& camera) {
 }
 
 void aberrate(const Camera& camera, const cv::Mat& light, const cv::Rect& part, cv::Mat& out) {
-  light(part).copyTo(out(part));
+  cv::Mat to = out(part);
+  light(part).copyTo(to);
+  const int reach_px = aberration_reach_px(camera);
+  const cv::Rect around =
+      cv::Rect(part.x - reach_px, part.y - reach_px, part.width + 2 * reach_px, part.height + 2 * reach_px) &
+      cv::Rect({0, 0}, light.size());
   const auto& [blue, red] = camera.chromatic_aberration;
   for (const auto& [channel, magnification] : {std::pair(0, blue), std::pair(2, red)}) {
     if (magnification == 1) continue;
     const double scale = 1 / magnification;
-    const cv::Matx23d light_from_part(scale, 0, scale * part.x + camera.cx_px * (1 - scale),  //
-                                      0, scale, scale * part.y + camera.cy_px * (1 - scale));
-    cv::Mat magnified, to = out(part);
-    cv::warpAffine(light, magnified, light_from_part, part.size(), cv::INTER_LANCZOS4 | cv::WARP_INVERSE_MAP,
+    const cv::Matx23d around_from_part(scale, 0, scale * part.x + camera.cx_px * (1 - scale) - around.x,  //
+                                       0, scale, scale * part.y + camera.cy_px * (1 - scale) - around.y);
+    cv::Mat plain, magnified;
+    cv::extractChannel(light(around), plain, channel);
+    cv::warpAffine(plain, magnified, around_from_part, part.size(), cv::INTER_LANCZOS4 | cv::WARP_INVERSE_MAP,
                    cv::BORDER_REPLICATE);
-    cv::mixChannels({magnified}, {to}, {channel, channel});
+    cv::insertChannel(magnified, to, channel);
   }
 }
 
