@@ -88,9 +88,10 @@ LimitedVelocity limit_velocity(const JointLimits& limits, const std::optional<Im
       bounds.push_back({-row, std::max(approach(ends->ends_px[i] - lower[i], -speed), -least)});
     }
   }
-  // Where braking is out of the range, so near to it as the other bounds allow.
+  // Where braking is out of the range, each joint so near to it as the other bounds allow.
+  const Eigen::Matrix4d by_rate = limits.rate.cwiseAbs2().cwiseInverse().asDiagonal();
   const Eigen::Vector4d in_range = braking.cwiseMax(range.lower).cwiseMin(range.upper),
-                        start = solve_velocity_qp(weight, in_range, bounds, braking).x;
+                        start = solve_velocity_qp(by_rate, in_range, bounds, braking).x;
   for (Eigen::Index i = 0; i < 4; ++i) {
     HalfSpace* high = bounds.begin() + 2 * i;
     HalfSpace* low = high + 1;

@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "lapservo/control/newton_inverse.h"
 #include "lapservo/control/tracking_law.h"
@@ -64,7 +65,11 @@ JointVector random_start(const Trajectory& trajectory, double duration_s, const 
                          const ControllerConfig& config, const Eigen::Vector4d& joint_offset, Random& random,
                          const std::string& source) {
   constexpr int max_places = 100000, max_starts = 60;
-  std::map<std::string, int> problems;  // and of how many starts
+  std::map<std::string, std::pair<int, std::string>> problems;  // by kind: of how many starts, the first one's text
+  const auto add = [&](const std::string& kind, const std::string& text) {
+    auto& [count, first] = problems[kind];
+    if (count++ == 0) first = text;
+  };
   int starts = 0;
   for (int i = 0; i < max_places && starts < max_starts; ++i) {
     Eigen::Vector4d q;
@@ -72,16 +77,17 @@ JointVector random_start(const Trajectory& trajectory, double duration_s, const 
     if (!in_view(model, config.window.value(), q + joint_offset)) continue;
     ++starts;
     if (const auto problem = find_problem(trajectory, duration_s, model, config, q, q + joint_offset)) {
-      ++problems[problem->text()];
+      add(problem->what.substr(0, problem->what.find(": needs")), problem->text());
       continue;
     }
     const auto goal = newton_inverse(model, trajectory.at(0).features, q, config.scales);
     if (goal && goal->converged && !seam_lies_between(model, q, goal->q)) return JointVector::from_vector(q);
-    ++problems["the marker's seam lies between the start and the trajectory"];
+    constexpr auto seam = "the marker's seam lies between the start and the trajectory";
+    add(seam, seam);
   }
   const auto usual = std::max_element(problems.begin(), problems.end(),
-                                      [](const auto& a, const auto& b) { return a.second < b.second; });
-  throw InputError(source, starts == 0 ? "no place in view lies within the joint limits" : usual->first);
+                                      [](const auto& a, const auto& b) { return a.second.first < b.second.first; });
+  throw InputError(source, starts == 0 ? "no place in view lies within the joint limits" : usual->second.second);
 }
 
 }  // namespace lapservo::internal

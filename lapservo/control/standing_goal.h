@@ -76,16 +76,20 @@ class LimitedGoal {
     rates << wanted, taken, moved;
     mean_ = begins ? rates : Rates(mean_ + std::min(1.0, period_s / mean_s) * (rates - mean_));
     const double least = part * goal_.in_scales(mean_.col(0));
-    const bool is_stopped = !begins && goal_.in_scales(mean_.col(1)) > least && goal_.in_scales(mean_.col(2)) < least;
+    is_limited_ = !begins && goal_.in_scales(mean_.col(1)) > least;
+    const bool is_stopped = is_limited_ && goal_.in_scales(mean_.col(2)) < least;
     stopped_s_ = is_stopped ? stopped_s_ + period_s : 0;
     return stopped_s_ > least_s;
   }
+  /// Whether limits take more than a tenth, though the arm may move.
+  bool is_limited() const { return is_limited_; }
 
  private:
   using Rates = Eigen::Matrix<double, 4, 3>;
   StandingGoal goal_;
   Rates mean_ = Rates::Zero();
   double stopped_s_ = 0;
+  bool is_limited_ = false;
 };
 
 }  // namespace lapservo::internal

@@ -104,6 +104,7 @@ ControlStep VisualController::step(double time_s, const Eigen::Vector4d& q_joint
   if (step.estimate && all_finite(desired)) step.error = feature_error(step.estimate->features, desired.features);
   if (step.reason == HoldReason::none && law.action == ControlAction::track && follows_) {
     const Eigen::Matrix4d& jacobian = step.estimate->jacobian;
+    if (law.stop.at) stops_at_ = law.stop.at;
     const bool stopped =
         limited_goal_.add(desired, step.error, jacobian * law.velocity, jacobian * (law.velocity - law.stop.left),
                           jacobian * path_.at(now_s_).velocity, config_.period_s);
@@ -127,7 +128,7 @@ ControlStep VisualController::step(double time_s, const Eigen::Vector4d& q_joint
     error_growth_.restart();
   } else if (tracks && error_growth_.add(desired, step.error)) {
     until_start_ = HoldReason::error_grows;
-    grows_at_ = law.stop.at;
+    grows_at_ = limited_goal_.is_limited() ? stops_at_ : std::nullopt;
   }
   return step;
 }
@@ -284,7 +285,12 @@ void VisualController::slow(Law& law, const Eigen::Vector4d& q_joint, const std:
 /// The law's velocity, as far as the limits allow it.
 void VisualController::limit(const Law& law, const Eigen::Vector4d& q_joint, ControlStep& step) const {
   const MotionState motion = path_.at(now_s_);
-  Eigen::Vector4d wanted = law.velocity;
+  // What limits of position take may be of any size. So much of it decides as the rest does, and the QP keeps its
+  // digits.
+  constexpr double most_rates = 1e3;
+  const Eigen::Vector4d taken = law.velocity - law.stop.left;
+  const double rates = taken.cwiseAbs().cwiseQuotient(law.rate).maxCoeff();
+  Eigen::Vector4d wanted = law.stop.left + taken / std::max(1.0, rates / most_rates);
   if (step.estimate) {
     JointLimits confirmed = config_.limits;
     confirmed.rate = confirmed.rate.cwiseMin(law.rate);

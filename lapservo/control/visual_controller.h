@@ -136,7 +136,8 @@ class VisualController {
   ErrorGrowth error_growth_;
   LimitedGoal limited_goal_;
   HoldReason until_start_ = HoldReason::none;  ///< a reason that only an operator ends
-  std::optional<PositionLimit> grows_at_;      ///< with error_grows
+  std::optional<PositionLimit> stops_at_;      ///< the last limit that took part of the motion
+  std::optional<PositionLimit> grows_at_;      ///< with error_grows, where it is one
   WildJoints wild_joints_;
   JointPath path_;
   HoldReason suspended_ = HoldReason::none;

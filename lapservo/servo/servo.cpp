@@ -52,14 +52,16 @@ std::string remedy_of(const ControlStep& control, const std::array<std::string, 
       return "say start to continue";
     case HoldReason::image_not_following:
       return control.unanswered ? unanswered_text(*control.unanswered, names, mode) : "";
-    case HoldReason::error_grows:
-      if (control.stops_at)
-        return limit_text(*control.stops_at, config) +
-               " keeps the arm from its goal, and its way along that limit leads away: give another goal, then say "
-               "start. Where the goal needs no such place, check joints.sign and camera_from_rcm";
-      return mode == ControlMode::uncalibrated
-                 ? "the arm moves away from its goal: run servo again, which learns the image's motion anew"
-                 : "the arm moves away from its goal: check joints.sign, camera_from_rcm and whose image it is";
+    case HoldReason::error_grows: {
+      const std::string check = mode == ControlMode::uncalibrated
+                                    ? "run servo again, which learns the image's motion anew"
+                                    : "check joints.sign, camera_from_rcm and whose image it is";
+      if (!control.stops_at) return "the arm moves away from its goal: " + check;
+      return limit_text(*control.stops_at, config) +
+             " keeps the arm from its goal, and its way along that limit leads away: give another goal, then say "
+             "start. Where the goal needs no such place, " +
+             check;
+    }
     case HoldReason::delay_not_found:
       return "images and joints agree at no delay up to 0.3 s: check whose image it is, or give delay_s";
     case HoldReason::tip_open:

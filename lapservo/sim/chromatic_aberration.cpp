@@ -11,11 +11,13 @@ namespace lapservo::internal {
 int aberration_reach_px(const Camera& camera) {
   constexpr int lanczos_px = 4;
   const auto& [blue, red] = camera.chromatic_aberration;
-  const double magnified = std::max(std::abs(blue - 1), std::abs(red - 1));
-  if (magnified == 0) return 0;
+  double moved = 0;  // at a distance of one
+  for (const double magnification : {blue, red})
+    moved = std::max({moved, std::abs(magnification - 1), std::abs(1 / magnification - 1)});
+  if (moved == 0) return 0;
   const double corner_px = std::hypot(std::max(camera.cx_px, camera.width_px - camera.cx_px),
                                       std::max(camera.cy_px, camera.height_px - camera.cy_px));
-  return static_cast<int>(std::ceil(magnified * corner_px)) + lanczos_px;
+  return static_cast<int>(std::ceil(moved * corner_px)) + lanczos_px;
 }
 
 void aberrate(const Camera& camera, const cv::Mat& light, const cv::Rect& part, cv::Mat& out) {

@@ -67,15 +67,18 @@ int run(const CalibrateOptions& options) {
   const Alignment found = align(instrument, poses.all, joints->recording, joints->source);
   if (!found.refusal.empty()) return refuse(options.input, found.refusal);
   std::printf("%s\n%s\n", offset_text(found).c_str(), drift_text(found).c_str());
-  job.write_page(page_of(options.input, found, instrument.joints.value()));
+  const auto write_page = [&] { job.write_page(page_of(options.input, found, instrument.joints.value())); };
   if (!job.out) {
+    write_page();
     std::printf("to apply it: write it into %s's entry in %s, or repeat this with --out %s\n", instrument.name.c_str(),
                 options.rig.c_str(), options.rig.c_str());
     return 0;
   }
   job.rig.instruments[job.index].image_delay_s = found.delay_s;
   job.rig.instruments[job.index].sigma_image_delay_s = rounded_sigma(found.sigma_delay_s);
-  return job.write();
+  const int written = job.write();
+  write_page();
+  return written;
 }
 
 }  // namespace

@@ -331,6 +331,7 @@ int run_all(AllOptions options) {
   expect_replaceable(options.rig);
   refuse_other_kind(options.report, ".html");
   if (!options.report.empty()) OutputTarget{options.report};  // the last step writes it
+  refuse_shared_place({options.rig, options.report});
   load_rig(options.rig);
   if (options.camera.empty() && (options.enable_motion || !options.robot.empty()))
     throw InputError(options.robot.empty() ? "--enable-motion" : "--robot", "needs --camera: both are to be recorded");
