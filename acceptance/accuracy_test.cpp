@@ -20,7 +20,6 @@ namespace lapservo::acceptance::accuracy_test {
 using namespace internal;
 
 constexpr double mrad = 1e-3, mm = 1e-3;
-constexpr double steepest_rad = 0.35;
 
 class Samples : public ::testing::Test {
   void SetUp() override {
@@ -183,7 +182,7 @@ TEST(Stored, CompressedPicturesHaveAtMostTwiceTheStatedError) {
 RenderedSet usual_set(std::uint64_t seed, int count = 16) {
   RenderedSet set;
   set.rig = example_rig();
-  set.configurations = random_configurations(set.rig, count, seed, steepest_rad);
+  set.configurations = random_configurations(set.rig, count, seed);
   set.seed = seed;
   return set;
 }

@@ -25,7 +25,6 @@ namespace lapservo::acceptance::calibrate_marker_test {
 using namespace internal;
 
 constexpr double mm = 1e-3;
-constexpr double steepest_rad = 0.35;
 
 struct Errors {
   std::string name;
@@ -54,7 +53,7 @@ Marker real_print(const Marker& nominal, const Errors& errors, Random& random) {
 
 // A turn about the shaft's axis, hardly moving otherwise.
 std::vector<std::vector<JointVector>> turn(const Rig& rig, int frames, std::uint64_t seed) {
-  const JointVector start = random_configurations(rig, 1, seed, steepest_rad)[0][0];
+  const JointVector start = random_configurations(rig, 1, seed)[0][0];
   std::vector<std::vector<JointVector>> all;
   for (int i = 0; i < frames; ++i) {
     const double fraction = static_cast<double>(i) / frames;
@@ -113,8 +112,7 @@ TEST_P(CalibrateMarker, LeavesLittleOfAPrintsErrors) {
     ASSERT_EQ(calibration.refusal, "") << "print " << i;
     Rig rig = nominal;
     rig.instruments[0].marker = calibration.marker;
-    const auto frames =
-        rendered(print, random_configurations(nominal, held_out, 7 * own_seed, steepest_rad), own_seed, effects);
+    const auto frames = rendered(print, random_configurations(nominal, held_out, 7 * own_seed), own_seed, effects);
     std::vector<double> sigmas = laboratories::errors_over_sigmas(calibration.marker, print);
     if (const Marker& is = calibration.marker; is.gap_rad > 0)
       sigmas.push_back((is.gap_rad - print.gap_rad) / *is.sigmas.gap_rad);

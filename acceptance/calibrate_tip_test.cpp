@@ -322,7 +322,7 @@ TEST_F(CalibrateTipTool, FindsAWristByTouchesFromEitherCornerOfAChessboard) {
     expect_done("calibrate tip --touch " + touches + to);
     expect_tip("tip.yaml", truth, 0.15e-3);
   }
-  const std::string wrong = replaced(table, "touch3.png,7,0", "touch3.png,9,0");
+  const std::string wrong = testing::replaced(table, "touch3.png,7,0", "touch3.png,9,0");
   testing::write_file("wrong.csv", wrong);
   ToolTest::expect_refused("calibrate tip --touch wrong.csv" + to, {"wrong.csv", "column", "0 to 8"});
 }

@@ -23,7 +23,6 @@
 #include "lapservo/calibration/registration/registration.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/core/random.h"
-#include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/testing/environment.h"
 
 namespace lapservo::acceptance::calibration_misfit_test {
@@ -167,6 +166,13 @@ std::vector<JointDeparture> joint_departures() {
   return all;
 }
 
+void expect_good(const std::string& step, const Answers& clean, const Answers& departed) {
+  clean.print(step + ", clean"), departed.print(step + ", departed");
+  EXPECT_EQ(clean.refused(), 0);
+  EXPECT_EQ(departed.wrong(), 0);
+  EXPECT_GE(departed.named(), 0.8);
+}
+
 TEST(CalibrationMisfit, Registration) {
   Answers clean, departed;
   for (const Recording& recording : recordings()) {
@@ -182,10 +188,7 @@ TEST(CalibrationMisfit, Registration) {
       departed.add("focal length times " + std::to_string(focal).substr(0, 4), "focal length",
                    registration_of(swing(recording, focal)));
   }
-  clean.print("registration, clean"), departed.print("registration, departed");
-  EXPECT_EQ(clean.refused(), 0);
-  EXPECT_EQ(departed.wrong(), 0);
-  EXPECT_GE(departed.named(), 0.8);
+  expect_good("registration", clean, departed);
 }
 
 // --- alignment
@@ -270,10 +273,7 @@ TEST(CalibrationMisfit, Camera) {
     for (const BoardDeparture& departure : board_departures())
       departed.add(departure.name, departure.cause, camera_of(recording, departure));
   }
-  clean.print("camera, clean"), departed.print("camera, departed");
-  EXPECT_EQ(clean.refused(), 0);
-  EXPECT_EQ(departed.wrong(), 0);
-  EXPECT_GE(departed.named(), 0.8);
+  expect_good("camera", clean, departed);
 }
 
 // --- marker
@@ -301,10 +301,7 @@ TEST(CalibrationMisfit, Marker) {
       departed.add("edge slips by " + std::to_string(1e3 * slip_m).substr(0, 4) + " mm", "slips",
                    marker_of(recording, slip_m));
   }
-  clean.print("marker, clean"), departed.print("marker, departed");
-  EXPECT_EQ(clean.refused(), 0);
-  EXPECT_EQ(departed.wrong(), 0);
-  EXPECT_GE(departed.named(), 0.8);
+  expect_good("marker", clean, departed);
 }
 
 }  // namespace lapservo::acceptance::calibration_misfit_test

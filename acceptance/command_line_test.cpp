@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdint>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -32,16 +31,11 @@
 namespace lapservo::internal::command_line_test {
 namespace fs = std::filesystem;
 using lapservo::testing::read_file;
+using lapservo::testing::replaced;
 using lapservo::testing::write_file;
 
 class CommandLine : public acceptance::ToolTest {
  protected:
-  void SetUp() override {
-    ToolTest::SetUp();
-    fs::create_directory("in");
-    fs::create_directory("out");
-  }
-
   // Nothing is left in out/.
   static void expect_refused(const std::string& arguments, const std::vector<std::string>& words) {
     ToolTest::expect_refused(arguments, words);
@@ -271,8 +265,7 @@ TEST_F(CommandLine, ServoRunsAndReplays) {
   const std::string log = read_file("out/off/log.csv");
   write_file("out/off/log.csv", log.substr(0, log.find('\n') + 1));
   ToolTest::expect_refused("servo --replay out/off/log.csv", {"log.csv", "holds no tick"});
-  const std::string text = read_file("configs/paper.yaml"), turned = "-0.0156, -3]";
-  const std::string rig = in("turned.yaml", std::string(text).replace(text.find("-0.0156, 0]"), 11, turned));
+  const std::string rig = in("turned.yaml", replaced(read_file("configs/paper.yaml"), "-0.0156, 0]", "-0.0156, -3]"));
   expect_done("servo --robot sim --joint-limits configs/joint_limits/psm-classic.yaml --duration 8 --seed 3 --rig " +
               rig);
   // It converges, and then ends in a hold.

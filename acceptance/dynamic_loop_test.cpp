@@ -15,7 +15,6 @@
 #include "lapservo/core/random.h"
 #include "lapservo/core/statistics.h"
 #include "lapservo/geometry/rotation.h"
-#include "lapservo/kinematics/tip_kinematics.h"
 #include "lapservo/servo/image_features.h"
 #include "lapservo/servo/servo.h"
 #include "lapservo/servo/tip_goals.h"

@@ -68,8 +68,9 @@ TEST_F(EstimateRcm, WithinAPixelFromTwentyPositions) {
 TEST_F(EstimateRcm, UndistortsWithARigAndWarnsWithout) {
   constexpr std::uint64_t seed = 81;
   Random random(seed);
-  const std::string bent = write("bent.yaml", replaced(read_file("configs/paper.yaml"), "data: [0, 0, 0, 0, 0]",
-                                                       "data: [-0.25, 0.08, 0.001, -0.0005, 0]"));
+  const std::string bent =
+      write("bent.yaml", lapservo::testing::replaced(read_file("configs/paper.yaml"), "data: [0, 0, 0, 0, 0]",
+                                                     "data: [-0.25, 0.08, 0.001, -0.0005, 0]"));
   const Rig rig = load_rig(bent);
   const Eigen::Vector3d t = rig.instruments.front().camera_from_rcm->translation;
   const std::string observations =

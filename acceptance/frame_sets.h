@@ -85,6 +85,6 @@ Rig example_rig();
 
 /// Random configurations of it with the marker wholly in view, pointing at most `steepest` rad towards or away.
 std::vector<std::vector<JointVector>> random_configurations(const Rig& rig, int count, std::uint64_t seed,
-                                                            double steepest_rad);
+                                                            double steepest_rad = 0.35);
 
 }  // namespace lapservo::acceptance

@@ -22,7 +22,6 @@ namespace lapservo::acceptance::hidden_boundaries_test {
 using namespace internal;
 
 constexpr double mm = 1e-3;
-constexpr double steepest_rad = 0.35;
 
 // The parts that blood hides.
 struct Kind {
@@ -75,7 +74,7 @@ class HiddenBoundaries : public ::testing::Test {
     std::vector<Blotch>& blood = shaft.blotches = blood_over(print, random.uniform(0.7, 1) * kind.beside, random);
     for (const std::size_t boundary : kind.hidden) bleed_over(print, boundary, kind.of_turn, blood, random);
     if (kind.partly >= 0) bleed_over(print, static_cast<std::size_t>(kind.partly), 0.5, blood, random);
-    JointVector q = random_configurations(rig, 1, random.bits(), steepest_rad)[0][0];
+    JointVector q = random_configurations(rig, 1, random.bits())[0][0];
     const cv::Mat tissue = make_tissue(rig.camera.width_px, rig.camera.height_px, static_cast<std::uint64_t>(number));
     Renderer renderer(rig.camera, {shaft}, tissue, {});
     Tracker tracker(rig, {.single = frames == 1});

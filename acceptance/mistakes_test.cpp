@@ -16,7 +16,6 @@
 
 #include <gtest/gtest.h>
 #include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
 
 #include "acceptance/tool_test.h"
 #include "lapservo/core/csv.h"
@@ -53,11 +52,7 @@ struct Mistake {
 };
 
 std::string changed(std::string text, const Changes& changes) {
-  for (const auto& [what, by] : changes) {
-    const auto at = text.find(what);
-    EXPECT_NE(at, std::string::npos) << what;
-    if (at != std::string::npos) text.replace(at, what.size(), by);
-  }
+  for (const auto& [what, by] : changes) text = lapservo::testing::replaced(text, what, by);
   return text;
 }
 

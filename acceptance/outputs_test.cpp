@@ -24,10 +24,6 @@ using testing::write_file;
 
 class Outputs : public acceptance::ToolTest {
  protected:
-  void SetUp() override {
-    ToolTest::SetUp();
-    fs::create_directory("out");
-  }
   void render(const std::string& more = "") { expect_done("render --rig " + rig_ + " --out frames --count 2" + more); }
 
   // Starts the tool, kills it when `far_enough`, says whether it came that far.
@@ -211,7 +207,6 @@ TEST_F(Outputs, AnEmptyFolderIsTakenAsItIs) {
 TEST_F(Outputs, ARunsFolderStandsOnItsOwn) {
   const std::string text = read_file("configs/paper.yaml");
   const std::size_t list = text.find("instruments:"), camera = text.find("camera:");
-  fs::create_directory("in");
   std::string inlined = text.substr(camera + 7, list - camera - 7);
   write_file("in/cam.yaml", inlined);
   write_file("in/rig.yaml", "camera: cam.yaml\n" + text.substr(list));

@@ -4,7 +4,6 @@
 
 #include <array>
 #include <cstdint>
-#include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -18,7 +17,6 @@ namespace lapservo::acceptance::prints_test {
 using namespace internal;
 
 constexpr double mm = 1e-3;
-constexpr double steepest_rad = 0.35;
 
 class Prints : public ::testing::Test {
  protected:
@@ -32,8 +30,7 @@ class Prints : public ::testing::Test {
   // In random places, or on the way between two.
   std::vector<std::vector<JointVector>> places(int number, bool moving) const {
     constexpr double step = 0.02;
-    auto all =
-        random_configurations(rig, moving ? 2 : poses, static_cast<std::uint64_t>(1000 * seed + number), steepest_rad);
+    auto all = random_configurations(rig, moving ? 2 : poses, static_cast<std::uint64_t>(1000 * seed + number));
     if (!moving) return all;
     const Eigen::Vector4d from = all[0][0].vector(), to = all[1][0].vector();
     all.clear();

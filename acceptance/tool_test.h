@@ -10,18 +10,21 @@
 
 #include <gtest/gtest.h>
 
+#include "lapservo/testing/has.h"
 #include "lapservo/testing/sample_frames.h"
 #include "lapservo/testing/temporary_folder.h"
 
 namespace lapservo::acceptance {
 
-/// The command line's tool in a folder of its own, which is the current one and holds configs/ as a link.
+/// The command line's tool in a folder of its own, which is the current one and holds configs/ as a link, empty in/ and
+/// out/.
 class ToolTest : public ::testing::Test {
  protected:
   void SetUp() override {
     ::setenv("ASAN_OPTIONS", "detect_leaks=0", 1);  // OpenCV's video backends keep what they allocated
     std::filesystem::current_path(folder_.path());
     std::filesystem::create_symlink(testing::source_folder() / "configs", "configs");
+    for (const char* folder : {"in", "out"}) std::filesystem::create_directory(folder);
   }
   void TearDown() override { std::filesystem::current_path("/"); }
 
@@ -53,14 +56,7 @@ class ToolTest : public ::testing::Test {
     EXPECT_EQ(text.find("filesystem error"), std::string::npos) << text;
     for (const std::string& word : words) expect_in(text, word);
   }
-  static std::string replaced(std::string text, const std::string& what, const std::string& by) {
-    const auto at = text.find(what);
-    EXPECT_NE(at, std::string::npos) << what;
-    return at == std::string::npos ? text : text.replace(at, what.size(), by);
-  }
-  static void expect_in(const std::string& text, std::string_view word) {
-    EXPECT_NE(text.find(word), std::string::npos) << "no '" << word << "' in: " << text;
-  }
+  static void expect_in(const std::string& text, std::string_view word) { EXPECT_TRUE(testing::has(text, word)); }
 
  private:
   const testing::TemporaryFolder folder_;

@@ -13,9 +13,7 @@
 #include "recordings/open_bag.h"
 
 // Any bytes are a bag that is read to its end, or an InputError. All values read are finite.
-namespace {
-using namespace lapservo;
-using namespace lapservo::internal;
+namespace lapservo::internal::bag_fuzz {
 using fuzz::read_or_refuse;
 using fuzz::require;
 
@@ -39,8 +37,6 @@ void read_frames(const std::shared_ptr<const Bag>& bag) {
   }
 }
 
-}  // namespace
-
 extern "C" int LLVMFuzzerInitialize(int*, char***) {
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
   return 0;
@@ -60,3 +56,5 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   });
   return 0;
 }
+
+}  // namespace lapservo::internal::bag_fuzz

@@ -9,9 +9,7 @@
 #include "lapservo/io/tables/configuration_csv.h"
 
 // Any text is a table whose numbers are finite, or an InputError. The columns are those of observations and truth.
-namespace {
-using namespace lapservo;
-using namespace lapservo::internal;
+namespace lapservo::internal::csv_fuzz {
 using fuzz::require;
 
 void read_number(const CsvTable& table, std::size_t row, const std::string& column) {
@@ -33,8 +31,6 @@ void read_as_configurations(const CsvTable& table) {
   });
 }
 
-}  // namespace
-
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   fuzz::read_or_refuse([&] {
     const CsvTable table = CsvTable::parse({reinterpret_cast<const char*>(data), size}, "fuzz.csv");
@@ -51,3 +47,5 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   });
   return 0;
 }
+
+}  // namespace lapservo::internal::csv_fuzz

@@ -8,9 +8,7 @@
 #include "lapservo/rig/rig.h"
 
 // Any text is a rig that can be used over the largest circle amid its image and every rotation, or an InputError.
-namespace {
-using namespace lapservo;
-using namespace lapservo::internal;
+namespace lapservo::internal::rig_fuzz {
 using fuzz::require;
 
 void require_usable(const Camera& camera) {
@@ -41,8 +39,6 @@ void require_usable(const Instrument& instrument) {
   require(std::abs(instrument.camera_from_rcm->rotation.norm() - 1) < 1e-9, "the RCM frame is orthonormal");
 }
 
-}  // namespace
-
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string_view text(reinterpret_cast<const char*>(data), size);
   fuzz::read_or_refuse([&] {
@@ -53,3 +49,5 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   });
   return 0;
 }
+
+}  // namespace lapservo::internal::rig_fuzz

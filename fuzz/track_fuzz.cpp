@@ -18,9 +18,7 @@
 
 // All results for any changed image of a marker are finite and can be written and drawn. The first byte chooses rig and
 // method, the second the image; every eight that follow paint over it, or show it to the tracker and go on.
-namespace {
-using namespace lapservo;
-using namespace lapservo::internal;
+namespace lapservo::internal::track_fuzz {
 using fuzz::require;
 
 std::vector<cv::Mat> pictures() {
@@ -107,8 +105,6 @@ void track(TrackedRig& tracked, const cv::Mat& image) {
   require(draw_overlay(image, rig, observations).size() == image.size(), "an overlay has its image's size");
 }
 
-}  // namespace
-
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const std::vector<cv::Mat> base = pictures();
   static std::vector<TrackedRig> rigs = all_rigs();
@@ -127,3 +123,5 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   track(tracked, image);
   return 0;
 }
+
+}  // namespace lapservo::internal::track_fuzz

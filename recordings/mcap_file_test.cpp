@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
 #include <random>
 #include <string>
@@ -10,14 +9,11 @@
 
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
-#include "recordings/open_bag.h"
 #include "recordings/ros2_file.h"
 #include "recordings/test_bags.h"
 
 namespace lapservo::internal::mcap_file_test {
-using testing::BagEntry;
-using testing::input_error;
-using testing::McapLayout;
+using namespace testing;
 
 constexpr double begin_s = 1700000000;
 

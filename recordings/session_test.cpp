@@ -15,7 +15,6 @@
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
 #include "recordings/open_bag.h"
-#include "recordings/test_bags.h"
 
 namespace lapservo::internal::session_test {
 using testing::input_error;

@@ -15,12 +15,7 @@
 
 namespace lapservo::internal::live_page_test {
 
-using lapservo::testing::http;
-using lapservo::testing::http_post;
-using lapservo::testing::http_status;
-using lapservo::testing::press_path;
-using lapservo::testing::RawConnection;
-using lapservo::testing::start_path;
+using namespace lapservo::testing;
 
 using Change = void (*)(PageConfig&);
 

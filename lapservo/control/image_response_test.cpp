@@ -12,10 +12,7 @@
 
 namespace lapservo::internal::image_response_test {
 
-using testing::Flaws;
-using testing::Moment;
-using testing::TestRig;
-using testing::TestSimulator;
+using namespace testing;
 
 constexpr int seeds = 20;
 const Eigen::Vector4d allowed(0.02, 0.02, 0.003, 0.1);

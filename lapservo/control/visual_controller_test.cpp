@@ -17,10 +17,7 @@
 
 namespace lapservo::internal::visual_controller_test {
 
-using testing::Flaws;
-using testing::Moment;
-using testing::TestRig;
-using testing::TestSimulator;
+using namespace testing;
 
 const Eigen::Vector4d close_enough{0.005, 1, 1, 1};
 

@@ -13,9 +13,7 @@
 
 namespace lapservo::internal::output_target_test {
 namespace fs = std::filesystem;
-using testing::input_error;
-using testing::read_file;
-using testing::TemporaryFolder;
+using namespace testing;
 
 std::string refusal_to_write(const fs::path& path) {
   return input_error([&] { const OutputTarget target(path); });

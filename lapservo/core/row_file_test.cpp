@@ -10,9 +10,7 @@
 
 namespace lapservo::internal::row_file_test {
 namespace fs = std::filesystem;
-using testing::input_error;
-using testing::read_file;
-using testing::TemporaryFolder;
+using namespace testing;
 
 TEST(RowFile, WithoutCommitNothingIsLeft) {
   const TemporaryFolder folder;

@@ -1,7 +1,5 @@
 #include "lapservo/crtk/image_receiver.h"
 
-#include <cmath>
-
 #include <gtest/gtest.h>
 
 namespace lapservo::internal::image_receiver_test {

@@ -23,10 +23,7 @@ namespace lapservo::internal::frame_source_test {
 namespace fs = std::filesystem;
 
 constexpr int frames = testing::video_frames;
-using testing::read_file;
-using testing::read_video;
-using testing::VideoRead;
-using testing::with_damage;
+using namespace testing;
 
 void write_video(const fs::path& path) {
   VideoWriter video(path, 25);

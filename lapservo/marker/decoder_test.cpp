@@ -21,10 +21,7 @@
 #include "lapservo/testing/seeded_random.h"
 
 namespace lapservo::internal::decoder_test {
-using testing::askew;
-using testing::marker_with;
-using testing::random_linear_marker;
-using testing::random_marker;
+using namespace testing;
 
 constexpr std::uint64_t seed = 31;
 const Marker falling = marker_with({0.0035, 0.0035, 0.017}, {0.0095, 0.0095, 0.005});

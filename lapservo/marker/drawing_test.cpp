@@ -31,9 +31,7 @@ extern "C" const char* __lsan_default_suppressions() {  // NOLINT(bugprone-reser
 namespace lapservo::internal::drawing_test {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
-using testing::input_error;
-using testing::marker_with;
-using testing::TemporaryFolder;
+using namespace testing;
 
 const Marker example = marker_with({0.0035, 0.0035, 0.017}, {0.0095, 0.0095, 0.005});
 // A unit of cairo's fixed-point coordinates.

@@ -11,6 +11,7 @@
 #include "lapservo/testing/temporary_folder.h"
 
 namespace lapservo::internal::camera_formats_test {
+using testing::replaced;
 
 constexpr auto opencv = R"(%YAML:1.0
 ---
@@ -75,10 +76,6 @@ Camera camera_of(const std::string& text) {
   const testing::TemporaryFolder folder;
   testing::write_file(folder / "camera.yaml", text);
   return parse_rig(rig, "rig.yaml", folder.path()).camera;
-}
-
-std::string replaced(std::string text, const std::string& part, const std::string& by) {
-  return text.replace(text.find(part), part.size(), by);
 }
 
 void expect_refused(const std::string& text, const std::string& why) {

@@ -13,6 +13,7 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/rig/check_rig.h"
+#include "lapservo/testing/has.h"
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
 
@@ -42,10 +43,7 @@ instruments:
 )";
 
 std::string with(const std::string& old_text, const std::string& new_text) {
-  std::string yaml = good;
-  const std::size_t at = yaml.find(old_text);
-  EXPECT_NE(at, std::string::npos) << old_text;
-  return yaml.replace(at, old_text.size(), new_text);
+  return testing::replaced(good, old_text, new_text);
 }
 
 std::string error_of(const std::string& yaml) {

@@ -1,7 +1,5 @@
 #include "lapservo/servo/moving_camera.h"
 
-#include <cmath>
-
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
 

@@ -9,7 +9,6 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/core/minimum_jerk.h"
 #include "lapservo/core/random.h"
-#include "lapservo/kinematics/tip_kinematics.h"
 #include "lapservo/servo/goal_check.h"
 #include "lapservo/servo/image_features.h"
 #include "lapservo/servo/image_window.h"

@@ -62,10 +62,7 @@ void expect_agreement(const Chain& chain, const Tool& tool, Random& random) {
 }
 
 std::string changed(const std::string& old_text, const std::string& new_text) {
-  std::string json(invented_tool_json);
-  const std::size_t at = json.find(old_text);
-  EXPECT_NE(at, std::string::npos) << old_text;
-  return json.replace(at, old_text.size(), new_text);
+  return testing::replaced(std::string(invented_tool_json), old_text, new_text);
 }
 
 TEST(DvrkToolFile, HasThePoseThatDvrkComputes) {

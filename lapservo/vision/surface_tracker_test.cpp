@@ -515,24 +515,20 @@ TEST(Tracker, SearchesTheOnlyFrameOfATemporaryWhole) {
   EXPECT_EQ(found, 2);
 }
 
-// A frame of a turn while the shutter was open, with psi in its middle; even, or with a constant acceleration from
-// rest.
-cv::Mat render_turning(const Rig& rig, const JointVector& q, double turn_rad, bool even) {
-  return scenes::render_moving(rig, q, {.turn_rad = turn_rad, .from_rest = !even});
-}
-
 // The image shows psi's mean over the exposure.
 TEST(SurfaceTracker, ATurnWithinTheExposureGivesPsiOfItsMiddle) {
   double squares = 0, from_rest_squares = 0;
   scenes::for_each_shot(3, [&](const Shot& shot) {
     for (const double turn_rad : {0.1, -0.25, 0.3}) {
       SCOPED_TRACE("turn " + std::to_string(turn_rad));
-      const Observation even = Tracker(shot.rig).track(render_turning(shot.rig, shot.q, turn_rad, true))[0];
+      const Observation even =
+          Tracker(shot.rig).track(scenes::render_moving(shot.rig, shot.q, {.turn_rad = turn_rad}))[0];
       expect_right(even, shot.q);
       const double error_rad = psi_error_rad(even, shot.q);
       squares += error_rad * error_rad / even.rcm->covariance(3, 3) / 9;
       // Its mean is a twelfth of the turn from its middle, and what an edge fit makes of it no farther.
-      const Observation from_rest = Tracker(shot.rig).track(render_turning(shot.rig, shot.q, turn_rad, false))[0];
+      const Observation from_rest = Tracker(shot.rig).track(
+          scenes::render_moving(shot.rig, shot.q, {.turn_rad = turn_rad, .from_rest = true}))[0];
       ASSERT_EQ(to_string(from_rest.status), "ok");
       const double from_rest_rad = psi_error_rad(from_rest, shot.q);
       EXPECT_LT(std::abs(from_rest_rad), std::abs(turn_rad) / 12 + 0.002);
@@ -554,9 +550,9 @@ TEST(SurfaceTracker, TellsAnEvenTurnFromAStartByTheFramesBefore) {
       const int periods = before + dropped;
       JointVector q = shot.q;
       q.psi_rad -= even ? turn_rad * periods : turn_rad / 4;  // of which it has come so far in the middle
-      tracker.track(render_turning(shot.rig, q, even ? turn_rad : 0, true), -periods * period_s);
+      tracker.track(scenes::render_moving(shot.rig, q, {.turn_rad = even ? turn_rad : 0}), -periods * period_s);
     }
-    const cv::Mat third = render_turning(shot.rig, shot.q, turn_rad, even);
+    const cv::Mat third = scenes::render_moving(shot.rig, shot.q, {.turn_rad = turn_rad, .from_rest = !even});
     return std::sqrt(tracker.track(third, 0)[0].rcm.value().covariance(3, 3));
   };
   for (const int dropped : {0, 1, 2}) EXPECT_LT(sigma_of_third_frame(true, dropped), 0.003) << dropped;

@@ -14,9 +14,7 @@
 namespace lapservo::internal::camera_departure_test {
 
 using effects::CameraEffects;
-using scenes::Shot;
-using scenes::Sight;
-using scenes::usual_shot;
+using namespace scenes;
 
 constexpr std::uint64_t frames = 12;
 

@@ -8,9 +8,7 @@
 
 namespace lapservo::internal::displaced_boundary_test {
 
-using scenes::Shot;
-using scenes::Sight;
-using scenes::usual_shot;
+using namespace scenes;
 
 // A fit that is where the rig's print would show, with this inner boundary on few lines, as blood leaves it.
 FineFit fit_with_few(const PoseUnknowns& unknowns, std::size_t boundary) {

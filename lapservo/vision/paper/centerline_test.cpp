@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/core/angles.h"
-#include "lapservo/kinematics/features.h"
 #include "lapservo/testing/shots.h"
 #include "lapservo/vision/shaft/rcm_prior.h"
 

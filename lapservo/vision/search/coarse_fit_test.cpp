@@ -10,9 +10,7 @@
 
 namespace lapservo::internal::coarse_fit_test {
 
-using scenes::Shot;
-using scenes::Sight;
-using scenes::usual_shot;
+using namespace scenes;
 
 // Farthest that a boundary on the centre line lies from its true place.
 double miss_px(const Shot& shot, const ShaftPose& pose) {

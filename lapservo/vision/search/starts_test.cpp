@@ -8,7 +8,6 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/testing/shots.h"
-#include "lapservo/vision/search/agreement_search.h"
 
 namespace lapservo::internal::starts_test {
 
