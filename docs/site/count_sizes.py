@@ -9,7 +9,7 @@ from pathlib import Path
 # folder: lines, chosen numbers
 LIMITS = {"lapservo/vision": (9395, 267)}
 TESTS = ["*_test.cpp", "*/test_*.cpp", "*/test_*.h", "lapservo/testing/*", "acceptance/*.cpp", "acceptance/*.h", "fuzz/*.cpp", "fuzz/*.h"]
-MOST_TEST_LINES = 36930
+MOST_TEST_LINES = 36932
 
 NOT_CODE = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\])*"|\'(?:\\.|[^\'\\])\'|^#[^\n]*', re.S | re.M)
 NUMBER = re.compile(r"(?<![\w.])(?:\d[\d']*\.?\d*|\.\d+)(?:[eE][+-]?\d+)?[fFuUlL]*(?![\w.])")

@@ -285,8 +285,7 @@ void VisualController::slow(Law& law, const Eigen::Vector4d& q_joint, const std:
 /// The law's velocity, as far as the limits allow it.
 void VisualController::limit(const Law& law, const Eigen::Vector4d& q_joint, ControlStep& step) const {
   const MotionState motion = path_.at(now_s_);
-  // What limits of position take may be of any size. So much of it decides as the rest does, and the QP keeps its
-  // digits.
+  // Limits of position may take a motion of any size. A bounded part of it has the same effect and keeps the QP exact.
   constexpr double most_rates = 1e3;
   const Eigen::Vector4d taken = law.velocity - law.stop.left;
   const double rates = taken.cwiseAbs().cwiseQuotient(law.rate).maxCoeff();

@@ -88,7 +88,7 @@ class FrameDiagnosis {
   int frames_ = 0, without_instrument_ = 0, interlaced_ = 0, blended_ = 0, damaged_ = 0;
   std::map<std::string, Seen> seen_;
   std::vector<cv::Mat> kept_;
-  cv::Mat shown_;  ///< the first frame with a result
+  cv::Mat shown_;           ///< the first frame with a result
   int without_result_ = 0;  ///< frames, some of which may show an instrument that misses the rig's RCM
 };
 
